@@ -1,0 +1,236 @@
+/* Per-triangle data: height range, range of |N|, folds, degenerate triangles; and boxes. */
+#include "math/poly.h"
+#include "shell/shell.h"
+
+#include <string.h>
+
+/* A shell counts as folded already where its volume element falls to this fraction of its largest
+ * value: inversion is badly conditioned there. */
+static const double FOLD_MARGIN = 0.01;
+/* Interpolated normals shorter than this are as good as opposing. */
+static const double LEAST_NORMAL = 1e-3;
+
+static float round_down(double x)
+{
+    float f = (float)x;
+    return (double)f > x ? nextafterf(f, -INFINITY) : f;
+}
+
+static float round_up(double x)
+{
+    float f = (float)x;
+    return (double)f < x ? nextafterf(f, INFINITY) : f;
+}
+
+/* Distance from the origin to the segment a b. */
+static double segment_distance(vec3 a, vec3 b)
+{
+    vec3 d = v3_sub(b, a);
+    double length = v3_dot(d, d), k = length > 0.0 ? -v3_dot(a, d) / length : 0.0;
+    return v3_length(v3_mad(a, min_d(max_d(k, 0.0), 1.0), d));
+}
+
+/* Smallest |N| over the triangle: the distance from the origin to the triangle of the normals. */
+static double least_normal(const triangle_frame *f)
+{
+    double least = min_d(segment_distance(f->n[0], f->n[1]),
+                         min_d(segment_distance(f->n[1], f->n[2]), segment_distance(f->n[2], f->n[0])));
+    vec3 plane = v3_cross(f->ne, f->nf);
+    double area = v3_dot(plane, plane);
+    if (area > 0.0) {
+        /* Foot of the perpendicular from the origin, in barycentrics. */
+        vec3 to = v3_neg(f->n[0]);
+        double b1 = v3_dot(v3_cross(to, f->nf), plane) / area, b2 = v3_dot(v3_cross(f->ne, to), plane) / area;
+        if (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0)
+            least = min_d(least, fabs(v3_dot(f->n[0], plane)) / sqrt(area));
+    }
+    return least * (1.0 - 1e-12);
+}
+
+static bool all_equal_normals(const triangle_frame *f)
+{
+    return v3_dot(f->ne, f->ne) == 0.0 && v3_dot(f->nf, f->nf) == 0.0;
+}
+
+/* n(s) . a for n(s) = (pe + s ne) x (pf + s nf), as a quadratic in s. */
+static quadratic volume_quadratic(const triangle_frame *f, vec3 a)
+{
+    return (quadratic){{v3_dot(v3_cross(f->pe, f->pf), a),
+                        v3_dot(v3_add(v3_cross(f->pe, f->nf), v3_cross(f->ne, f->pf)), a),
+                        v3_dot(v3_cross(f->ne, f->nf), a)}};
+}
+
+/* det[P_a + s N_a, P_b + s N_b, N] is linear in the barycentrics through N: its sign over the shell
+ * is that of the Bernstein coefficients of the three vertices' quadratics in s. */
+static bool is_folded(const triangle_frame *f)
+{
+    double least = INFINITY, most = -INFINITY;
+    for (int i = 0; i < 3; i++) {
+        quadratic volume = volume_quadratic(f, f->n[i]);
+        double b[3];
+        quadratic_bernstein(&volume, f->s0, f->s1, b);
+        for (int k = 0; k < 3; k++) {
+            least = min_d(least, b[k]);
+            most = max_d(most, b[k]);
+        }
+    }
+    return !(least > FOLD_MARGIN * most) && !(most < FOLD_MARGIN * least);
+}
+
+/* No area at any height: the offset triangles at three heights are all degenerate, so the quadratic
+ * is zero. Relative to the edges, so that small triangles are not mistaken for empty ones. */
+static bool is_empty(const triangle_frame *f)
+{
+    for (int i = 0; i < 3; i++) {
+        double s = i == 0 ? f->s0 : i == 1 ? f->s1 : 0.5 * (f->s0 + f->s1);
+        vec3 e = v3_mad(f->pe, s, f->ne), g = v3_mad(f->pf, s, f->nf);
+        if (v3_length(v3_cross(e, g)) > 1e-14 * v3_length(e) * v3_length(g)) return false;
+    }
+    return true;
+}
+
+static bool is_flat_uv(const triangle_frame *f)
+{
+    double area = fabs(f->xe * f->yf - f->xf * f->ye);
+    double edge = max_d(f->xe * f->xe + f->ye * f->ye, f->xf * f->xf + f->yf * f->yf);
+    return !(area > 1e-9 * edge) || edge < 1e-12;
+}
+
+/* Range of the reconstruction of level k over the triangle's box in texture space. Few samples are
+ * read one by one: a bound through level 0 would have to grow by 1.5 texels of level k, which is
+ * loose where the triangle covers only a few of them. */
+static knurl_range level_range(const shell_space *space, uint32_t triangle, int32_t k)
+{
+    enum { FEW_SAMPLES = 256 };
+    height_lod lod;
+    triangle_frame f;
+    height_lod_make(space, (double)k, &lod);
+    triangle_frame_load(space, triangle, &lod, &f);
+    double pad = 4.0 * f.texel_rounding;
+    double x0 = min_d(f.x[0], min_d(f.x[1], f.x[2])) - pad, x1 = max_d(f.x[0], max_d(f.x[1], f.x[2])) + pad;
+    double y0 = min_d(f.y[0], min_d(f.y[1], f.y[2])) - pad, y1 = max_d(f.y[0], max_d(f.y[1], f.y[2])) + pad;
+    if (k == 0 || (x1 - x0 + 2.0) * (y1 - y0 + 2.0) > (double)FEW_SAMPLES)
+        return shell_height_range(space, &lod, KNURL_BOUNDS_RMIP, &f, x0, y0, x1, y1);
+    knurl_range range = {INFINITY, -INFINITY};
+    for (int64_t j = (int64_t)floor(y0); j <= (int64_t)floor(y1); j++)
+        for (int64_t i = (int64_t)floor(x0); i <= (int64_t)floor(x1); i++) {
+            height_patch patch;
+            height_patch_load(space, &lod, &f, i, j, 0, 0, &patch);
+            range.min = min_d(range.min, patch.min);
+            range.max = max_d(range.max, patch.max);
+        }
+    return range;
+}
+
+/* Range of h over the triangle at every level of detail: averages of a coarse level reach beyond the
+ * triangle, and may leave the range of level 0 over it. */
+static knurl_range all_levels_range(const shell_space *space, uint32_t triangle)
+{
+    knurl_range range = {INFINITY, -INFINITY};
+    for (int32_t k = 0; k < space->map->level_count; k++) {
+        knurl_range level = level_range(space, triangle, k);
+        range.min = min_d(range.min, level.min);
+        range.max = max_d(range.max, level.max);
+    }
+    return range;
+}
+
+static void build_shell(const shell_space *space, const height_lod *lod, uint32_t triangle)
+{
+    shell *stored = &space->shells[triangle];
+    *stored = (shell){.normal_min = 1.0f};
+    knurl_range range = all_levels_range(space, triangle);
+    stored->height_min = round_down(range.min);
+    stored->height_max = round_up(range.max);
+    triangle_frame f;
+    triangle_frame_load(space, triangle, lod, &f);
+    double least = least_normal(&f);
+    stored->normal_min = space->unnormalised ? 1.0f : round_down(max_d(least, LEAST_NORMAL));
+    triangle_frame_load(space, triangle, lod, &f);
+    if (is_empty(&f))
+        stored->flags |= SHELL_EMPTY;
+    else if (is_folded(&f) || (!space->unnormalised && least < LEAST_NORMAL))
+        stored->flags |= SHELL_FOLDED;
+    if (is_flat_uv(&f)) stored->flags |= SHELL_FLAT_UV;
+    if (all_equal_normals(&f)) stored->flags |= SHELL_CONSTANT_NORMAL;
+}
+
+static void build_range(void *user, size_t begin, size_t end, int32_t thread)
+{
+    const shell_space *space = user;
+    (void)thread;
+    height_lod lod;
+    height_lod_make(space, 0.0, &lod);
+    for (size_t t = begin; t < end; t++) build_shell(space, &lod, (uint32_t)t);
+}
+
+/* Length of a texel of level 0 on the base mesh: square root of area over texels. */
+static double mean_texel_size(const shell_space *space)
+{
+    double area = 0.0, texels = 0.0;
+    height_lod lod;
+    height_lod_make(space, 0.0, &lod);
+    for (uint32_t t = 0; t < space->mesh.triangle_count; t++) {
+        triangle_frame f;
+        triangle_frame_load(space, t, &lod, &f);
+        area += v3_length(v3_cross(f.pe, f.pf));
+        texels += fabs(f.xe * f.yf - f.xf * f.ye);
+    }
+    return texels > 0.0 ? sqrt(area / texels) : 0.0;
+}
+
+static knurl_status check_uv(const shell_space *space, knurl_error *error)
+{
+    for (uint32_t v = 0; v < space->mesh.vertex_count; v++) {
+        const float *st = space->mesh.texcoords + 2 * (size_t)v;
+        vec2 uv = shell_uv(space, (double)st[0], (double)st[1]);
+        if (!(fabs(uv.x) < 0x1p20 && fabs(uv.y) < 0x1p20))
+            return knurl_fail(error, KNURL_ERROR_INPUT,
+                              "vertex %u: map coordinates (%g, %g), expected magnitudes under 2^20", v, uv.x,
+                              uv.y);
+    }
+    return KNURL_OK;
+}
+
+knurl_status shell_space_build(shell_space *space, knurl_error *error)
+{
+    knurl_status status = check_uv(space, error);
+    if (status != KNURL_OK) return status;
+    space->shells = knurl_alloc_array(space->context, space->mesh.triangle_count, sizeof *space->shells);
+    if (!space->shells)
+        return knurl_fail_memory(error, space->mesh.triangle_count * sizeof *space->shells, "shells");
+    if (space->mesh.triangle_count)
+        memset(space->shells, 0, space->mesh.triangle_count * sizeof *space->shells);
+    knurl_parallel_for(space->context, space->mesh.triangle_count, 256, build_range, space);
+    space->texel_size = mean_texel_size(space);
+    return KNURL_OK;
+}
+
+bool shell_box(const shell_space *space, uint32_t triangle, double lower[3], double upper[3])
+{
+    const shell *stored = &space->shells[triangle];
+    if (stored->flags & SHELL_EMPTY) return false;
+    height_lod lod;
+    height_lod_make(space, 0.0, &lod);
+    triangle_frame f;
+    triangle_frame_load(space, triangle, &lod, &f);
+    vec3 lo = f.p[0], hi = f.p[0];
+    for (int i = 0; i < 3; i++) {
+        /* F is affine in b at fixed s and in s at fixed b: the corners bound it. */
+        vec3 low = v3_mad(f.p[i], f.s0, f.n[i]), high = v3_mad(f.p[i], f.s1, f.n[i]);
+        lo = v3_min(lo, v3_min(low, high));
+        hi = v3_max(hi, v3_max(low, high));
+    }
+    if (stored->flags & SHELL_FOLDED && !space->unnormalised &&
+        (double)stored->normal_min <= 2.0 * LEAST_NORMAL) {
+        /* |N| reaches zero: only |S - P| <= |h| is left. */
+        double h = max_d(fabs((double)stored->height_min), fabs((double)stored->height_max));
+        lo = v3_sub(v3_min(f.p[0], v3_min(f.p[1], f.p[2])), v3(h, h, h));
+        hi = v3_add(v3_max(f.p[0], v3_max(f.p[1], f.p[2])), v3(h, h, h));
+    }
+    double pad = 1e-12 * (f.size + v3_max_component(v3_max(v3_abs(lo), v3_abs(hi)))) +
+                 4e-16 * v3_max_component(v3_abs(f.base));
+    v3_store(lower, v3_add(f.base, v3_sub(lo, v3(pad, pad, pad))));
+    v3_store(upper, v3_add(f.base, v3_add(hi, v3(pad, pad, pad))));
+    return true;
+}

@@ -1,0 +1,457 @@
+/* The explicit ray curve; see curve.h. */
+#include "shell/curve.h"
+
+#include <string.h>
+
+/* A ray whose sine against the offset plane it starts in is under this is followed by depth.
+ * By height, rounding is amplified by 1 / sine: to 1e-11 here. By depth, the curve is cut after its
+ * quadratic term, an error of order sine^2: to 1e-10 here. */
+static const double GRAZING_SINE = 1e-5;
+/* Followed by height, a stretch must end at a side or at the height range, before W falls to this
+ * fraction of the offset triangle's area; where it does not, the shell is nearly folded and the curve
+ * is declared unreliable. */
+static const double LEAST_SINE = 1e-8;
+
+/* Everything seen along the ray: two coordinates across it and the depth along it. */
+typedef struct ray_view {
+    vec3 across1, across2, along; /* orthonormal */
+    double length;                /* of the direction */
+    vec3 p[3];                    /* P_i - O in (across1, across2, along) */
+    vec3 n[3];
+    double p_rounding;     /* bound on the absolute error of p */
+    double p_size, n_size; /* largest across coordinate of P_i, N_i */
+} ray_view;
+
+static double cross2(vec3 a, vec3 b)
+{
+    return a.x * b.y - a.y * b.x;
+}
+
+/* Frisvad-like orthonormal basis, branch by sign (Duff et al. 2017). */
+static void make_basis(vec3 d, vec3 *e1, vec3 *e2)
+{
+    double sign = copysign(1.0, d.z), a = -1.0 / (sign + d.z), b = d.x * d.y * a;
+    *e1 = v3(1.0 + sign * d.x * d.x * a, sign * b, -sign * d.x);
+    *e2 = v3(b, sign + d.y * d.y * a, -d.y);
+}
+
+static vec3 to_view(const ray_view *v, vec3 a)
+{
+    return v3(v3_dot(a, v->across1), v3_dot(a, v->across2), v3_dot(a, v->along));
+}
+
+/* P_i - O is formed from the vertex itself, never relative to another vertex: neighbours that
+ * share an edge then see the same numbers for it. */
+static void view_make(const triangle_frame *f, const knurl_ray *ray, ray_view *v)
+{
+    vec3 direction = v3_load(ray->direction), origin = v3_load(ray->origin);
+    v->length = v3_length(direction);
+    v->along = v3_scale(direction, 1.0 / v->length);
+    make_basis(v->along, &v->across1, &v->across2);
+    double far = 0.0;
+    v->p_size = v->n_size = 0.0;
+    for (int i = 0; i < 3; i++) {
+        vec3 relative = v3_sub(v3_add(f->base, f->p[i]), origin);
+        far = max_d(far, v3_max_component(v3_abs(relative)));
+        v->p[i] = to_view(v, relative);
+        v->n[i] = to_view(v, f->n[i]);
+        v->p_size = max_d(v->p_size, max_d(fabs(v->p[i].x), fabs(v->p[i].y)));
+        v->n_size = max_d(v->n_size, max_d(fabs(v->n[i].x), fabs(v->n[i].y)));
+    }
+    v->p_rounding = 8.0 * DBL_EPSILON * far;
+}
+
+/* V_j(s) x V_k(s) as a quadratic in s. */
+static quadratic side_quadratic(const ray_view *v, int j, int k)
+{
+    return (quadratic){{cross2(v->p[j], v->p[k]), cross2(v->p[j], v->n[k]) + cross2(v->n[j], v->p[k]),
+                        cross2(v->n[j], v->n[k])}};
+}
+
+/* a W + b B1 + c B2 */
+static quadratic combine(const ray_curve *c, double a, double b, double d)
+{
+    quadratic q;
+    for (int i = 0; i < 3; i++) q.c[i] = a * c->w.c[i] + b * c->b1.c[i] + d * c->b2.c[i];
+    return q;
+}
+
+/* Whether W comes so close to 0 between s0 and s1 that the ray may graze; then which s the ray's
+ * point nearest to the triangle's centre has decides (is_grazing). */
+static bool may_graze(const ray_curve *c, const triangle_frame *f, double threshold)
+{
+    double b[3];
+    quadratic_bernstein(&c->w, f->s0, f->s1, b);
+    double lowest = min_d(b[0], min_d(b[1], b[2])), highest = max_d(b[0], max_d(b[1], b[2]));
+    return lowest <= threshold && highest >= -threshold;
+}
+
+/* Solves columns [a b c] x = r by Cramer's rule; false if singular. */
+static bool solve3(vec3 a, vec3 b, vec3 c, vec3 r, vec3 *x)
+{
+    vec3 bc = v3_cross(b, c);
+    double det = v3_dot(a, bc);
+    if (!(fabs(det) > 1e-14 * v3_length(a) * v3_length(bc)) || !isfinite(det)) return false;
+    double inverse = 1.0 / det;
+    *x =
+        v3(v3_dot(r, bc) * inverse, v3_dot(a, v3_cross(r, c)) * inverse, v3_dot(a, v3_cross(b, r)) * inverse);
+    return true;
+}
+
+static vec3 shell_point(const triangle_frame *f, vec3 q)
+{
+    vec3 base = v3_mad(v3_scale(f->pe, q.x), q.y, f->pf);
+    return v3_mad(base, q.z, v3_mad(v3_mad(f->n[0], q.x, f->ne), q.y, f->nf));
+}
+
+static void shell_columns(const triangle_frame *f, vec3 q, vec3 *ja, vec3 *jb, vec3 *js)
+{
+    *ja = v3_mad(f->pe, q.z, f->ne);
+    *jb = v3_mad(f->pf, q.z, f->nf);
+    *js = v3_mad(v3_mad(f->n[0], q.x, f->ne), q.y, f->nf);
+}
+
+/* Inverts F(b1, b2, s) = point by Newton's method from *q. The point is relative to vertex 0. */
+static bool invert_point(const triangle_frame *f, vec3 point, vec3 *q)
+{
+    for (int i = 0; i < 20; i++) {
+        vec3 ja, jb, js, step;
+        shell_columns(f, *q, &ja, &jb, &js);
+        if (!solve3(ja, jb, js, v3_sub(point, shell_point(f, *q)), &step)) return false;
+        *q = v3_add(*q, step);
+        if (!v3_finite(*q)) return false;
+        double change = fabs(step.x) + fabs(step.y) + fabs(step.z) / (f->size + fabs(q->z));
+        if (change < 1e-15 * (1.0 + fabs(q->x) + fabs(q->y))) return true;
+        if (i >= 6 && change < 1e-12) return true;
+    }
+    return false;
+}
+
+/* Curve by depth, from the ray's point nearest to the triangle's centre: value, tangent J c' = D and
+ * bend J c'' = -2 s' (N_x x' + N_y y'). */
+static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_ray *ray, vec3 start,
+                        ray_curve *c)
+{
+    double center = (v->p[0].z + v->p[1].z + v->p[2].z) / 3.0;
+    vec3 relative = v3_sub(v3_load(ray->origin), f->base);
+    vec3 q = start, ja, jb, js, tangent, bend;
+    if (!invert_point(f, v3_mad(relative, center, v->along), &q)) return false;
+    shell_columns(f, q, &ja, &jb, &js);
+    if (!solve3(ja, jb, js, v->along, &tangent)) return false;
+    vec3 turn = v3_scale(v3_mad(v3_scale(f->ne, tangent.x), tangent.y, f->nf), -2.0 * tangent.z);
+    if (!solve3(ja, jb, js, turn, &bend)) return false;
+    c->by_depth = true;
+    c->depth_origin = center / v->length;
+    c->depth_scale = 1.0 / v->length;
+    c->w = (quadratic){{1.0, 0.0, 0.0}};
+    c->b1 = (quadratic){{q.x, tangent.x, 0.5 * bend.x}};
+    c->b2 = (quadratic){{q.y, tangent.y, 0.5 * bend.y}};
+    c->s = (quadratic){{q.z, tangent.z, 0.5 * bend.z}};
+    return true;
+}
+
+/* Bound on the error of b by rounding, for the curve by depth of an affine shell. */
+static double affine_rounding(const triangle_frame *f, const ray_view *v)
+{
+    double det = v3_det(f->pe, f->pf, f->n[0]);
+    double amplification = v3_length(v3_cross(f->pe, f->pf)) + v3_length(v3_cross(f->pf, f->n[0])) +
+                           v3_length(v3_cross(f->pe, f->n[0]));
+    return (v->p_rounding + 16.0 * DBL_EPSILON * f->size) * amplification / fabs(det) + 16.0 * DBL_EPSILON;
+}
+
+/* One condition on the parameter: value(p) >= -allowance. */
+typedef struct condition {
+    quadratic q;
+    double allowance;
+} condition;
+
+static bool holds(const condition *conditions, int count, double p)
+{
+    for (int i = 0; i < count; i++)
+        if (!(quadratic_at(&conditions[i].q, p) >= -conditions[i].allowance)) return false;
+    return true;
+}
+
+static void sort(double *values, int count)
+{
+    for (int i = 1; i < count; i++) {
+        double value = values[i];
+        int j = i;
+        for (; j > 0 && values[j - 1] > value; j--) values[j] = values[j - 1];
+        values[j] = value;
+    }
+}
+
+static void add_interval(ray_curve *c, double a, double b)
+{
+    if (c->interval_count == CURVE_MAX_INTERVALS) {
+        c->unreliable = true;
+        return;
+    }
+    double ta = curve_depth(c, a), tb = curve_depth(c, b);
+    bool forward = ta <= tb;
+    c->intervals[c->interval_count++] =
+        forward ? (curve_interval){a, b, ta, tb} : (curve_interval){b, a, tb, ta};
+}
+
+/* Stretches of [lo, hi] where all conditions hold. Cuts at the conditions' roots and tests midpoints
+ * (closed, and widened by each condition's allowance for rounding). */
+static void find_intervals(ray_curve *c, const condition *conditions, int count, double lo, double hi)
+{
+    double cuts[16];
+    int n = 0;
+    cuts[n++] = lo;
+    for (int i = 0; i < count; i++) {
+        quadratic q = conditions[i].q;
+        q.c[0] += conditions[i].allowance;
+        double roots[2];
+        int found = quadratic_roots(&q, roots);
+        for (int k = 0; k < found; k++)
+            if (roots[k] > lo && roots[k] < hi) cuts[n++] = roots[k];
+    }
+    cuts[n++] = hi;
+    sort(cuts, n);
+    double start = 0.0;
+    bool open = false;
+    for (int i = 0; i + 1 < n; i++) {
+        bool inside = holds(conditions, count, 0.5 * (cuts[i] + cuts[i + 1]));
+        if (inside && !open) start = cuts[i];
+        if (!inside && open) add_interval(c, start, cuts[i]);
+        open = inside;
+    }
+    if (open) add_interval(c, start, hi);
+}
+
+/* Allowance for q_i: products of coordinates known to p_rounding, and the polynomial's rounding. */
+static double side_allowance(const triangle_frame *f, const ray_view *v)
+{
+    double reach = v->p_size + max_d(fabs(f->s0), fabs(f->s1)) * v->n_size;
+    return 4.0 * reach * v->p_rounding + 32.0 * DBL_EPSILON * reach * reach;
+}
+
+/* By height, W > 0 and W < 0 are separate cases: q_i >= 0 or q_i <= 0. */
+static void height_intervals(ray_curve *c, const triangle_frame *f, const ray_view *v, double area)
+{
+    double allowance = side_allowance(f, v), w_floor = LEAST_SINE * area, bernstein[3];
+    quadratic b0 = combine(c, 1.0, -1.0, -1.0);
+    quadratic_bernstein(&c->w, f->s0, f->s1, bernstein);
+    double lowest = min_d(bernstein[0], min_d(bernstein[1], bernstein[2]));
+    double highest = max_d(bernstein[0], max_d(bernstein[1], bernstein[2]));
+    for (int sign = -1; sign <= 1; sign += 2) {
+        if (sign > 0 ? highest <= w_floor : lowest >= -w_floor) continue;
+        condition conditions[4] = {{b0, allowance}, {c->b1, allowance}, {c->b2, allowance}, {c->w, -w_floor}};
+        bool culled = false;
+        for (int i = 0; i < 4; i++) {
+            for (int k = 0; k < 3; k++) conditions[i].q.c[k] *= (double)sign;
+            double b[3];
+            quadratic_bernstein(&conditions[i].q, f->s0, f->s1, b);
+            culled |= max_d(b[0], max_d(b[1], b[2])) < -conditions[i].allowance;
+        }
+        if (!culled) find_intervals(c, conditions, 4, f->s0, f->s1);
+    }
+    double w_least = INFINITY;
+    for (int i = 0; i < c->interval_count; i++) {
+        curve_interval *s = &c->intervals[i];
+        double w[3];
+        quadratic_bernstein(&c->w, min_d(s->in, s->out), max_d(s->in, s->out), w);
+        w_least = min_d(w_least, min_d(fabs(w[0]), fabs(w[2])));
+    }
+    if (w_least < 1.001 * w_floor) c->unreliable = true;
+    c->barycentric_rounding = c->interval_count ? 2.0 * allowance / w_least + 16.0 * DBL_EPSILON : 0.0;
+}
+
+static void depth_intervals(ray_curve *c, const triangle_frame *f, double reach)
+{
+    double e = c->barycentric_rounding;
+    quadratic b0 = combine(c, 1.0, -1.0, -1.0), above = c->s, below = c->s;
+    above.c[0] -= f->s0;
+    for (int k = 0; k < 3; k++) below.c[k] = -below.c[k];
+    below.c[0] += f->s1;
+    double height_error = e * (f->size + fabs(f->s0) + fabs(f->s1));
+    condition conditions[5] = {{b0, e}, {c->b1, e}, {c->b2, e}, {above, height_error}, {below, height_error}};
+    find_intervals(c, conditions, 5, -reach, reach);
+}
+
+/* How far the quadratic curve by depth is from the true one at the ends of its intervals. */
+static bool measure_depth_error(const triangle_frame *f, const ray_view *v, const knurl_ray *ray,
+                                ray_curve *c)
+{
+    vec3 relative = v3_sub(v3_load(ray->origin), f->base);
+    double worst = 0.0;
+    for (int i = 0; i < c->interval_count; i++)
+        for (int end = 0; end < 2; end++) {
+            double p = end ? c->intervals[i].out : c->intervals[i].in;
+            vec3 predicted = v3(quadratic_at(&c->b1, p), quadratic_at(&c->b2, p), quadratic_at(&c->s, p));
+            vec3 q = predicted;
+            double depth = (c->depth_origin + p * c->depth_scale) * v->length;
+            if (!invert_point(f, v3_mad(relative, depth, v->along), &q)) return false;
+            worst = max_d(worst, max_d(fabs(q.x - predicted.x), fabs(q.y - predicted.y)));
+        }
+    c->barycentric_rounding = 4.0 * worst + 1e-12;
+    return worst < 1e-8;
+}
+
+/* Farthest depth, from the ray's point nearest to the centre, that the shell can reach. */
+static double depth_reach(const triangle_frame *f)
+{
+    return 4.0 * (f->size + max_d(fabs(f->s0), fabs(f->s1)) *
+                                max_d(v3_length(f->n[0]), max_d(v3_length(f->n[1]), v3_length(f->n[2]))));
+}
+
+static void make_texel_coordinates(const triangle_frame *f, ray_curve *c)
+{
+    c->x = combine(c, f->x[0], f->xe, f->xf);
+    c->y = combine(c, f->y[0], f->ye, f->yf);
+    double extent = fabs(f->xe) + fabs(f->xf) + fabs(f->ye) + fabs(f->yf);
+    c->texel_rounding = f->texel_rounding + c->barycentric_rounding * extent;
+}
+
+static void sort_intervals(ray_curve *c)
+{
+    for (int i = 1; i < c->interval_count; i++) {
+        curve_interval moving = c->intervals[i];
+        int j = i;
+        for (; j > 0 && c->intervals[j - 1].t_in > moving.t_in; j--) c->intervals[j] = c->intervals[j - 1];
+        c->intervals[j] = moving;
+    }
+}
+
+/* Grazing: the ray's point nearest to the centre is inverted (a cubic's root, found by Newton in the
+ * three unknowns), and the sine of the ray against the offset plane through that point decides.
+ * Returns false if neither parameter can be trusted. */
+static bool choose_grazing(const triangle_frame *f, const ray_view *v, const knurl_ray *ray, ray_curve *c,
+                           bool *by_depth)
+{
+    ray_curve depth = *c;
+    *by_depth = false;
+    if (!depth_curve(f, v, ray, v3(1.0 / 3.0, 1.0 / 3.0, 0.5 * (f->s0 + f->s1)), &depth)) return false;
+    double s = depth.s.c[0];
+    double sine = fabs(quadratic_at(&c->w, s));
+    vec3 ja = v3_mad(f->pe, s, f->ne), jb = v3_mad(f->pf, s, f->nf);
+    if (sine > GRAZING_SINE * v3_length(v3_cross(ja, jb))) return true; /* parallel to a plane elsewhere */
+    /* Far outside the height range Newton may have found another branch: not to be trusted. */
+    double margin = f->s1 - f->s0 + 0.1 * f->size;
+    if (s < f->s0 - margin || s > f->s1 + margin) return false;
+    *c = depth;
+    *by_depth = true;
+    return true;
+}
+
+/* Twice the area of the larger of the offset triangles at both ends of the height range. */
+static double largest_area(const triangle_frame *f)
+{
+    vec3 low = v3_cross(v3_mad(f->pe, f->s0, f->ne), v3_mad(f->pf, f->s0, f->nf));
+    vec3 high = v3_cross(v3_mad(f->pe, f->s1, f->ne), v3_mad(f->pf, f->s1, f->nf));
+    return sqrt(max_d(v3_dot(low, low), v3_dot(high, high)));
+}
+
+void ray_curve_make(const triangle_frame *f, const knurl_ray *ray, ray_curve *c)
+{
+    ray_view v;
+    view_make(f, ray, &v);
+    c->interval_count = 0;
+    c->by_depth = c->unreliable = false;
+    for (int i = 0; i < 3; i++) {
+        c->depth_p[i] = v.p[i].z / v.length;
+        c->depth_n[i] = v.n[i].z / v.length;
+    }
+    if (f->flags & SHELL_CONSTANT_NORMAL) {
+        if (!depth_curve(f, &v, ray, v3(0.0, 0.0, 0.0), c)) {
+            c->unreliable = true;
+            return;
+        }
+        c->barycentric_rounding = affine_rounding(f, &v);
+        depth_intervals(c, f, depth_reach(f));
+        make_texel_coordinates(f, c);
+        return;
+    }
+    quadratic q0 = side_quadratic(&v, 1, 2);
+    c->b1 = side_quadratic(&v, 2, 0);
+    c->b2 = side_quadratic(&v, 0, 1);
+    for (int k = 0; k < 3; k++) c->w.c[k] = q0.c[k] + c->b1.c[k] + c->b2.c[k];
+    double area = largest_area(f);
+    bool by_depth = false;
+    if (may_graze(c, f, GRAZING_SINE * area) && !choose_grazing(f, &v, ray, c, &by_depth)) {
+        c->unreliable = true;
+        return;
+    }
+    if (by_depth) {
+        c->barycentric_rounding = 1e-9;
+        depth_intervals(c, f, depth_reach(f));
+        if (!measure_depth_error(f, &v, ray, c)) c->unreliable = true;
+    } else {
+        height_intervals(c, f, &v, area);
+        sort_intervals(c);
+    }
+    make_texel_coordinates(f, c);
+}
+
+double curve_invert(const ray_curve *c, double in, double out, double t)
+{
+    if (c->by_depth) {
+        double p = (t - c->depth_origin) / c->depth_scale;
+        return p < in ? in : p > out ? out : p;
+    }
+    double t_in = curve_depth(c, in), t_out = curve_depth(c, out);
+    if (!(t > t_in)) return in;
+    if (!(t < t_out)) return out;
+    double a = in, b = out, p = in + (out - in) * ((t - t_in) / (t_out - t_in));
+    for (int i = 0; i < 60; i++) {
+        double value = curve_depth(c, p) - t;
+        if (value > 0.0)
+            b = p;
+        else
+            a = p;
+        /* Secant through the bracket's fresh end, bisection every third step. */
+        double ta = curve_depth(c, a) - t, tb = curve_depth(c, b) - t;
+        double next = i % 3 == 2 || !(tb > ta) ? 0.5 * (a + b) : a + (b - a) * (-ta / (tb - ta));
+        if (fabs(next - p) <= 1e-12 * fabs(out - in)) return next;
+        p = next;
+    }
+    return p;
+}
+
+double curve_cross(const ray_curve *c, const quadratic *coordinate, double k, double a, double b)
+{
+    quadratic q = {{coordinate->c[0] - k * c->w.c[0], coordinate->c[1] - k * c->w.c[1],
+                    coordinate->c[2] - k * c->w.c[2]}};
+    double lo = min_d(a, b), hi = max_d(a, b), roots[2];
+    int count = quadratic_roots(&q, roots);
+    double best = NAN, outside = INFINITY;
+    for (int i = 0; i < count; i++) {
+        double away = roots[i] < lo ? lo - roots[i] : roots[i] > hi ? roots[i] - hi : 0.0;
+        if (away < outside) {
+            outside = away;
+            best = roots[i];
+        }
+    }
+    if (outside <= 1e-9 * (hi - lo)) return best < lo ? lo : best > hi ? hi : best;
+    /* Rounding hid the root: bisect on the sign, which the caller's monotone stretch guarantees. */
+    bool rising = quadratic_at(&q, a) < 0.0;
+    for (int i = 0; i < 60; i++) {
+        double middle = 0.5 * (a + b);
+        if ((quadratic_at(&q, middle) < 0.0) == rising)
+            a = middle;
+        else
+            b = middle;
+    }
+    return 0.5 * (a + b);
+}
+
+int curve_turning_points(const ray_curve *c, const quadratic *coordinate, double a, double b,
+                         double turning[2])
+{
+    const double *x = coordinate->c, *w = c->w.c;
+    quadratic slope = {
+        {x[1] * w[0] - x[0] * w[1], 2.0 * (x[2] * w[0] - x[0] * w[2]), x[2] * w[1] - x[1] * w[2]}};
+    double roots[2], lo = min_d(a, b), hi = max_d(a, b);
+    int found = quadratic_roots(&slope, roots), count = 0;
+    for (int i = 0; i < found; i++)
+        if (roots[i] > lo && roots[i] < hi) turning[count++] = roots[i];
+    if (count == 2 && (turning[0] > turning[1]) != (a > b)) {
+        double first = turning[0];
+        turning[0] = turning[1];
+        turning[1] = first;
+    }
+    return count;
+}

@@ -1,0 +1,145 @@
+/* Loading one triangle for one ray: local frames, levels of detail, bilinear patches. */
+#include "shell/shell.h"
+
+#include <float.h>
+
+void height_lod_make(const shell_space *space, double lod, height_lod *out)
+{
+    const knurl_heightmap *map = space->map;
+    double last = (double)(map->level_count - 1);
+    if (!(lod > 0.0)) lod = 0.0;
+    if (lod > last) lod = last;
+    int32_t fine = (int32_t)lod;
+    int32_t coarse = fine + 1 < map->level_count ? fine + 1 : fine;
+    out->level[0] = &map->levels[fine];
+    out->level[1] = &map->levels[coarse];
+    out->blend = lod - (double)fine;
+    out->ratio[0] = (double)out->level[1]->width / (double)out->level[0]->width;
+    out->ratio[1] = (double)out->level[1]->height / (double)out->level[0]->height;
+    out->to_map[0] = (double)map->levels[0].width / (double)out->level[0]->width;
+    out->to_map[1] = (double)map->levels[0].height / (double)out->level[0]->height;
+    heightmap_lod_margin(map, lod, out->margin);
+}
+
+/* Texel coordinates of the vertices, relative to the integer texel below their centre. Multiples of
+ * the level's size are taken off first, so that the subtraction is of nearby numbers. */
+static void load_texels(const shell_space *space, const uint32_t *v, const height_lod *lod, triangle_frame *f)
+{
+    double w = (double)lod->level[0]->width, h = (double)lod->level[0]->height;
+    vec2 uv[3];
+    for (int i = 0; i < 3; i++) {
+        const float *st = space->mesh.texcoords + 2 * (size_t)v[i];
+        uv[i] = shell_uv(space, (double)st[0], (double)st[1]);
+    }
+    f->origin_x = (int64_t)floor((uv[0].x + uv[1].x + uv[2].x) / 3.0 * w - 0.5);
+    f->origin_y = (int64_t)floor((uv[0].y + uv[1].y + uv[2].y) / 3.0 * h - 0.5);
+    f->texel_rounding = 0.0;
+    for (int i = 0; i < 3; i++) {
+        f->x[i] = (uv[i].x * w - 0.5) - (double)f->origin_x;
+        f->y[i] = (uv[i].y * h - 0.5) - (double)f->origin_y;
+        double largest = max_d(fabs(uv[i].x * w), fabs(uv[i].y * h)) + 1.0;
+        f->texel_rounding = max_d(f->texel_rounding, 4.0 * DBL_EPSILON * largest);
+    }
+    f->xe = f->x[1] - f->x[0];
+    f->xf = f->x[2] - f->x[0];
+    f->ye = f->y[1] - f->y[0];
+    f->yf = f->y[2] - f->y[0];
+}
+
+/* Range of s = h / |N| for h in the shell's range, padded by more than the rounding of
+ * g(s) = s |N| - h, so that g has a definite sign at both ends even where h is constant. */
+static void load_height_range(const shell *stored, triangle_frame *f)
+{
+    double h0 = (double)stored->height_min, h1 = (double)stored->height_max;
+    double n_min = 1.0, n_max = 1.0;
+    if (!f->unnormalised) {
+        n_min = (double)stored->normal_min;
+        n_max =
+            sqrt(max_d(v3_dot(f->n[0], f->n[0]), max_d(v3_dot(f->n[1], f->n[1]), v3_dot(f->n[2], f->n[2]))));
+    }
+    f->s0 = h0 < 0.0 ? h0 / n_min : h0 / n_max;
+    f->s1 = h1 > 0.0 ? h1 / n_min : h1 / n_max;
+    double pad = 1e-9 * max_d(fabs(f->s0), fabs(f->s1)) + 1e-13 * f->size;
+    f->s0 -= pad;
+    f->s1 += pad;
+}
+
+void triangle_frame_load(const shell_space *space, uint32_t triangle, const height_lod *lod,
+                         triangle_frame *f)
+{
+    const uint32_t *v = space->mesh.triangles + 3 * (size_t)triangle;
+    const shell *stored = &space->shells[triangle];
+    f->flags = stored->flags;
+    f->unnormalised = space->unnormalised;
+    f->base = v3_loadf(space->mesh.positions + 3 * (size_t)v[0]);
+    for (int i = 0; i < 3; i++) {
+        f->p[i] = v3_sub(v3_loadf(space->mesh.positions + 3 * (size_t)v[i]), f->base);
+        f->n[i] = v3_loadf(space->mesh.normals + 3 * (size_t)v[i]);
+    }
+    f->pe = f->p[1];
+    f->pf = f->p[2];
+    f->ne = v3_sub(f->n[1], f->n[0]);
+    f->nf = v3_sub(f->n[2], f->n[0]);
+    f->size = v3_max_component(v3_max(v3_abs(f->pe), v3_abs(f->pf)));
+    load_texels(space, v, lod, f);
+    load_height_range(stored, f);
+    double det = f->xe * f->yf - f->xf * f->ye;
+    bool invertible = !(f->flags & SHELL_FLAT_UV) && det != 0.0;
+    double inverse = invertible ? 1.0 / det : 0.0;
+    f->inverse_uv[0] = f->yf * inverse;
+    f->inverse_uv[1] = -f->xf * inverse;
+    f->inverse_uv[2] = -f->ye * inverse;
+    f->inverse_uv[3] = f->xe * inverse;
+}
+
+/* Adds weight * (bilinear cell (i, j) of `level`) to the patch; (px, py) is the position of the
+ * patch's corner in the cell, (rx, ry) the cell's texels per texel of the patch. */
+static void add_cell(const shell_space *space, const height_level *level, int64_t i, int64_t j, double px,
+                     double py, double rx, double ry, double weight, height_patch *patch)
+{
+    int32_t i0 = height_wrap(i, level->width, space->wrap_u),
+            i1 = height_wrap(i + 1, level->width, space->wrap_u);
+    int32_t j0 = height_wrap(j, level->height, space->wrap_v),
+            j1 = height_wrap(j + 1, level->height, space->wrap_v);
+    double k = space->factor * weight, o = space->offset * weight;
+    double h00 = o + k * height_fetch(level, i0, j0), h10 = o + k * height_fetch(level, i1, j0);
+    double h01 = o + k * height_fetch(level, i0, j1), h11 = o + k * height_fetch(level, i1, j1);
+    double ax = h10 - h00, ay = h01 - h00, axy = (h11 - h01) - ax;
+    patch->c += h00 + ax * px + py * (ay + axy * px);
+    patch->cx += (ax + axy * py) * rx;
+    patch->cy += (ay + axy * px) * ry;
+    patch->cxy += axy * rx * ry;
+    patch->min += min_d(min_d(h00, h10), min_d(h01, h11));
+    patch->max += max_d(max_d(h00, h10), max_d(h01, h11));
+    patch->slope += (max_d(fabs(ax), fabs(ax + axy)) * rx + max_d(fabs(ay), fabs(ay + axy)) * ry);
+}
+
+void height_patch_load(const shell_space *space, const height_lod *lod, const triangle_frame *frame,
+                       int64_t i, int64_t j, int64_t i1, int64_t j1, height_patch *patch)
+{
+    *patch = (height_patch){.x = (double)i, .y = (double)j};
+    int64_t absolute_x = frame->origin_x + i, absolute_y = frame->origin_y + j;
+    add_cell(space, lod->level[0], absolute_x, absolute_y, 0.0, 0.0, 1.0, 1.0, 1.0 - lod->blend, patch);
+    if (lod->blend > 0.0) {
+        double px = ((double)absolute_x + 0.5) * lod->ratio[0] - 0.5 - (double)i1;
+        double py = ((double)absolute_y + 0.5) * lod->ratio[1] - 0.5 - (double)j1;
+        add_cell(space, lod->level[1], i1, j1, px, py, lod->ratio[0], lod->ratio[1], lod->blend, patch);
+    }
+    double rounding = 16.0 * DBL_EPSILON * (fabs(patch->min) + fabs(patch->max));
+    patch->min -= rounding;
+    patch->max += rounding;
+}
+
+knurl_range shell_height_range(const shell_space *space, const height_lod *lod, knurl_bounds_kind kind,
+                               const triangle_frame *frame, double x0, double y0, double x1, double y1)
+{
+    double sx = lod->to_map[0], sy = lod->to_map[1];
+    double ox = (double)frame->origin_x + 0.5, oy = (double)frame->origin_y + 0.5;
+    knurl_range raw =
+        heightmap_bounds_texels(space->map, kind, (x0 + ox) * sx - 0.5 - lod->margin[0],
+                                (y0 + oy) * sy - 0.5 - lod->margin[1], (x1 + ox) * sx - 0.5 + lod->margin[0],
+                                (y1 + oy) * sy - 0.5 + lod->margin[1], space->wrap_u, space->wrap_v);
+    double a = space->offset + space->factor * raw.min, b = space->offset + space->factor * raw.max;
+    double rounding = 4.0 * DBL_EPSILON * (fabs(a) + fabs(b));
+    return (knurl_range){min_d(a, b) - rounding, max_d(a, b) + rounding};
+}

@@ -1,0 +1,135 @@
+/* From a root to a hit: polishing, position, normals and error bound. */
+#include "shell/shell.h"
+
+#include <float.h>
+
+/* The surface and its derivatives along the barycentrics b1 and b2. */
+typedef struct surface_point {
+    vec3 n;           /* N / |N|, or N for the unnormalised variant */
+    double h, ha, hb; /* height and its derivatives */
+    vec3 s, sa, sb;   /* S relative to vertex 0, and its derivatives */
+    vec3 va, vb;      /* derivatives of the surface at constant height h */
+} surface_point;
+
+static surface_point surface_at(const triangle_frame *f, const height_patch *patch, double b1, double b2)
+{
+    surface_point p;
+    double x = f->x[0] + b1 * f->xe + b2 * f->xf, y = f->y[0] + b1 * f->ye + b2 * f->yf;
+    double dx = x - patch->x, dy = y - patch->y;
+    double hx = patch->cx + patch->cxy * dy, hy = patch->cy + patch->cxy * dx;
+    p.h = height_patch_at(patch, x, y);
+    p.ha = hx * f->xe + hy * f->ye;
+    p.hb = hx * f->xf + hy * f->yf;
+    vec3 n = v3_mad(v3_mad(f->n[0], b1, f->ne), b2, f->nf), na = f->ne, nb = f->nf;
+    if (!f->unnormalised) {
+        double inverse = 1.0 / v3_length(n);
+        n = v3_scale(n, inverse);
+        na = v3_scale(v3_mad(na, -v3_dot(n, na), n), inverse);
+        nb = v3_scale(v3_mad(nb, -v3_dot(n, nb), n), inverse);
+    }
+    p.n = n;
+    p.s = v3_mad(v3_mad(v3_scale(f->pe, b1), b2, f->pf), p.h, n);
+    p.va = v3_mad(f->pe, p.h, na);
+    p.vb = v3_mad(f->pf, p.h, nb);
+    p.sa = v3_mad(p.va, p.ha, n);
+    p.sb = v3_mad(p.vb, p.hb, n);
+    return p;
+}
+
+void shell_root_polish(const triangle_frame *f, const knurl_ray *ray, shell_root *root)
+{
+    vec3 direction = v3_load(ray->direction), origin = v3_sub(v3_load(ray->origin), f->base);
+    double best = INFINITY;
+    for (int i = 0; i < 4; i++) {
+        surface_point p = surface_at(f, &root->patch, root->b1, root->b2);
+        vec3 residual = v3_sub(v3_mad(origin, root->t, direction), p.s);
+        double size = v3_length(residual);
+        if (!(size < 0.5 * best)) return;
+        best = size;
+        vec3 cross = v3_cross(p.sb, direction);
+        double det = v3_dot(p.sa, cross);
+        /* Close to a tangency Newton is no better than the bracketed root. */
+        if (fabs(det) < 1e-7 * v3_length(p.sa) * v3_length(p.sb) * v3_length(direction)) return;
+        double db1 = v3_dot(residual, cross) / det;
+        double db2 = v3_dot(p.sa, v3_cross(residual, direction)) / det;
+        double dt = -v3_dot(p.sa, v3_cross(p.sb, residual)) / det;
+        /* A polish moves by rounding; anything larger means that this is not the same root. */
+        if (!(fabs(db1) + fabs(db2) < 1e-5)) return;
+        root->b1 += db1;
+        root->b2 += db2;
+        root->t += dt;
+        root->x += db1 * f->xe + db2 * f->xf;
+        root->y += db1 * f->ye + db2 * f->yf;
+    }
+}
+
+/* Height at any position of the frame's texels: the piece there is found anew. */
+static double height_anywhere(const shell_space *space, const height_lod *lod, const triangle_frame *f,
+                              double x, double y)
+{
+    height_patch patch;
+    int64_t i = (int64_t)floor(x), j = (int64_t)floor(y), i1 = 0, j1 = 0;
+    if (lod->blend > 0.0) {
+        i1 = (int64_t)floor((x + (double)f->origin_x + 0.5) * lod->ratio[0] - 0.5);
+        j1 = (int64_t)floor((y + (double)f->origin_y + 0.5) * lod->ratio[1] - 0.5);
+    }
+    height_patch_load(space, lod, f, i, j, i1, j1, &patch);
+    return height_patch_at(&patch, x, y);
+}
+
+/* PDM 2025, Eq. 10 with N_s from its Eq. 15, everything divided by the area of the base so that N_g
+ * and N' are unit: N'_s = N' + (h_b (V_a x N') + h_a (N' x V_b)) / |V_a x V_b|. V are the tangents at
+ * the hit's height, where PDM uses the base's: equal for small heights, right for large ones. The
+ * height's gradient is the central difference over one texel, which is continuous. */
+static vec3 smooth_normal(const shell_space *space, const height_lod *lod, const triangle_frame *f,
+                          const shell_root *root, const surface_point *p, vec3 ng)
+{
+    double hx = height_anywhere(space, lod, f, root->x + 0.5, root->y) -
+                height_anywhere(space, lod, f, root->x - 0.5, root->y);
+    double hy = height_anywhere(space, lod, f, root->x, root->y + 0.5) -
+                height_anywhere(space, lod, f, root->x, root->y - 0.5);
+    double ha = hx * f->xe + hy * f->ye, hb = hx * f->xf + hy * f->yf;
+    vec3 unit = v3_normalize(p->n), base = v3_cross(p->va, p->vb);
+    double area = v3_dot(base, unit);
+    if (!(fabs(area) > 1e-6 * v3_length(p->va) * v3_length(p->vb))) return ng;
+    vec3 gradient = v3_add(v3_scale(v3_cross(p->va, unit), hb), v3_scale(v3_cross(unit, p->vb), ha));
+    vec3 n = v3_normalize(v3_mad(unit, 1.0 / area, gradient));
+    /* The base's winding decides the side, as it does for ng. */
+    if (area < 0.0) n = v3_neg(n);
+    return v3_dot(n, n) > 0.0 ? n : ng;
+}
+
+void shell_hit_fill(const shell_space *space, const height_lod *lod, const triangle_frame *f,
+                    uint32_t triangle, const knurl_ray *ray, const shell_root *root, knurl_hit *hit)
+{
+    surface_point p = surface_at(f, &root->patch, root->b1, root->b2);
+    vec3 position = v3_add(f->base, p.s);
+    vec3 ng = v3_normalize(v3_cross(p.sa, p.sb));
+    if (!(v3_dot(ng, ng) > 0.0)) ng = v3_normalize(p.n);
+    const uint32_t *v = space->mesh.triangles + 3 * (size_t)triangle;
+    const float *st = space->mesh.texcoords;
+    double weights[3] = {1.0 - root->b1 - root->b2, root->b1, root->b2};
+    hit->t = root->t;
+    hit->a = root->b1;
+    hit->b = root->b2;
+    hit->st[0] = hit->st[1] = 0.0;
+    for (int i = 0; i < 3; i++) {
+        hit->st[0] += weights[i] * (double)st[2 * (size_t)v[i]];
+        hit->st[1] += weights[i] * (double)st[2 * (size_t)v[i] + 1];
+    }
+    vec2 uv = shell_uv(space, hit->st[0], hit->st[1]);
+    hit->uv[0] = uv.x;
+    hit->uv[1] = uv.y;
+    hit->height = p.h;
+    hit->triangle = triangle;
+    v3_store(hit->position, position);
+    v3_store(hit->ng, ng);
+    v3_store(hit->ns, smooth_normal(space, lod, f, root, &p, ng));
+    /* Rounding of the sum that makes the position, plus how far the root is off the ray. */
+    vec3 on_ray = v3_mad(v3_load(ray->origin), root->t, v3_load(ray->direction));
+    double rounding = 32.0 * DBL_EPSILON *
+                      (v3_max_component(v3_abs(f->base)) + f->size + fabs(p.h) +
+                       v3_max_component(v3_abs(v3_load(ray->origin))) +
+                       fabs(root->t) * v3_max_component(v3_abs(v3_load(ray->direction))));
+    hit->error = rounding + v3_length(v3_sub(on_ray, position));
+}

@@ -1,0 +1,24 @@
+/* shell/march.h: the exact leaf, and texel marching along a ray curve (RMIP 2023, section 4.4). */
+#ifndef KNURL_SRC_SHELL_MARCH_H
+#define KNURL_SRC_SHELL_MARCH_H
+
+#include "shell/curve.h"
+
+/* One ray against one shell. */
+typedef struct shell_walk {
+    const shell_space *space;
+    const height_lod *lod;
+    const triangle_frame *frame;
+    const ray_curve *curve;
+    const knurl_ray *ray;
+    shell_root root; /* the hit, once found */
+    uint32_t steps;  /* grows by one per texel visited */
+} shell_walk;
+
+/* Finds the first root of g = s |N| - h along the curve from parameter `in` to `out`, a stretch
+ * where x and y are monotone, with t in the ray's [tmin, tmax]. Visits the texels that the curve
+ * crosses in order. Both ends are closed: a g that is zero within rounding there is a hit, because
+ * the stretch's neighbour may see the other sign. */
+bool shell_march(shell_walk *walk, double in, double out);
+
+#endif
