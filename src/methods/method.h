@@ -1,0 +1,47 @@
+/* methods/method.h: the interface that every intersection method implements, and their list.
+ *
+ * To add a method: write its folder, fill one `method` struct, and name it in methods.c. */
+#ifndef KNURL_SRC_METHODS_METHOD_H
+#define KNURL_SRC_METHODS_METHOD_H
+
+#include "shell/shell.h"
+
+enum {
+    METHOD_EXACT = 1u << 0, /* finds the first root of the exact surface */
+    METHOD_LOD = 1u << 1,   /* fractional level of detail */
+    METHOD_FOLDED = 1u << 2 /* handles folded shells */
+};
+
+/* A query against one shell. The level of detail is resolved, the triangle is loaded. */
+typedef struct method_query {
+    const shell_space *space;
+    const height_lod *lod;
+    const triangle_frame *frame;
+    const knurl_ray *ray;
+    bool any;         /* any root in [tmin, tmax] will do */
+    shell_root *root; /* written on a hit */
+    uint32_t *steps;  /* grows by bounds and texels visited */
+} method_query;
+
+typedef struct method {
+    const char *name;
+    const char *summary;   /* one line, with its paper */
+    uint32_t capabilities; /* METHOD_* */
+    /* Makes the method's own data for a surface (NULL if it has none). Immutable afterwards. */
+    knurl_status (*build)(const shell_space *space, const knurl_surface_def *def, void **data,
+                          knurl_error *error);
+    /* First root of the shell along the ray in [tmin, tmax]. Thread-safe, never allocates. */
+    bool (*intersect)(const void *data, const method_query *query);
+    uint64_t (*bytes)(const void *data);
+    void (*destroy)(const shell_space *space, void *data);
+} method;
+
+/* NULL if there is none of that name. */
+const method *method_find(const char *name);
+
+/* The surface's map, for telling shared ones apart. Not retained. */
+const knurl_heightmap *knurl_surface_map(const knurl_surface *surface);
+
+extern const method method_rmip;
+
+#endif
