@@ -14,7 +14,7 @@ knurl_status knurl_file_read(knurl_context *context, const char *path, unsigned 
 {
     *bytes = NULL;
     *size = 0;
-    int file = open(path, O_RDONLY | O_CLOEXEC);
+    int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* never waits for a pipe */
     if (file < 0) return knurl_fail(error, KNURL_ERROR_INPUT, "%s: %s", path, strerror(errno));
     struct stat info;
     knurl_status status = KNURL_OK;
