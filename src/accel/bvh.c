@@ -1,0 +1,292 @@
+/* Hierarchies over boxes: Embree user geometry, called with float rays, decided in double.
+ *
+ * Why no hit is lost. Each hierarchy has its own coordinates x' = (x - c) s, where c is the centre
+ * of its bounds and s the power of two that makes their half-diagonal R at most 1. Rays start where
+ * they enter the bounds and are divided by a power of two so that the largest component of their
+ * direction is in [1/2, 1). So everything Embree sees is at most about 1 in size, whatever the
+ * scene's units and wherever its origin. With e = 2^-24, errors along one axis are then at most
+ *     e    rounding the entry point (which is found in double to 2^-50 or so),
+ *     2 e  rounding the direction, times the at most 2 units walked,
+ *     3 e  Embree's slab test, fma(plane, 1/d, -origin/d): two roundings,
+ *     8 e  its 1/d, good to 2 ulps, times the 2 units between plane and origin,
+ *     1 e  rounding the box itself,
+ * 15 e in all, and the robust flag (where Embree heeds it for user geometry) only lowers that.
+ * Boxes are padded by 32 e per side. As the errors are per axis, a padded box is entered on each
+ * axis before the true ray enters the true box, so neither comparison with tnear (always 0) nor
+ * with tfar (the best hit so far, rounded up) culls a box with a nearer hit in it. */
+#include "accel/device.h"
+
+#include <float.h>
+
+/* Padding of primitives, and of the bounds that rays are clipped to, in units of R. */
+static const double PRIMITIVE_PAD = 0x1p-19; /* 32 e */
+static const double BOUNDS_PAD = 0x1p-18;
+
+struct accel_bvh {
+    accel_device *device;
+    RTCScene scene; /* NULL if there is nothing in it */
+    accel_bounds_fn *bounds;
+    const void *user;
+    accel_box box;
+    vec3 centre, half; /* of the bounds; half is padded */
+    double scale;      /* s above */
+};
+
+typedef struct query {
+    knurl_embree_query_context base; /* first: the callbacks get its address */
+    accel_visit_fn *visit;
+    void *user;
+    double tmax;
+    double t0, rate; /* Embree's t is (t - t0) * rate */
+} query;
+
+/* ---- Building --------------------------------------------------------------------------------- */
+
+typedef struct bounds_job {
+    accel_bounds_fn *bounds;
+    const void *user;
+    accel_box *boxes; /* one per thread */
+} bounds_job;
+
+static void bounds_chunk(void *user, size_t begin, size_t end, int32_t thread)
+{
+    bounds_job *job = user;
+    accel_box all = job->boxes[thread];
+    for (size_t i = begin; i < end; i++) {
+        accel_box one;
+        if (job->bounds(job->user, (uint32_t)i, &one)) all = accel_box_union(&all, &one);
+    }
+    job->boxes[thread] = all;
+}
+
+static knurl_status find_bounds(accel_bvh *bvh, uint32_t count, knurl_error *error)
+{
+    knurl_context *context = bvh->device->context;
+    int32_t threads = knurl_context_threads(context);
+    bounds_job job = {.bounds = bvh->bounds, .user = bvh->user};
+    job.boxes = knurl_alloc_array(context, (size_t)threads, sizeof *job.boxes);
+    if (!job.boxes) return knurl_fail_memory(error, (size_t)threads * sizeof *job.boxes, "bounds");
+    for (int32_t i = 0; i < threads; i++) job.boxes[i] = accel_box_empty();
+    knurl_parallel_for(context, count, 4096, bounds_chunk, &job);
+    for (int32_t i = 0; i < threads; i++) bvh->box = accel_box_union(&bvh->box, &job.boxes[i]);
+    knurl_free(context, job.boxes);
+    return KNURL_OK;
+}
+
+static void set_frame(accel_bvh *bvh)
+{
+    vec3 middle = v3_mad(v3_scale(bvh->box.lower, 0.5), 0.5, bvh->box.upper);
+    /* Float coordinates, so that subtracting the centre from a float vertex is exact in double. */
+    bvh->centre = v3((double)(float)middle.x, (double)(float)middle.y, (double)(float)middle.z);
+    vec3 half = v3_max(v3_sub(bvh->box.upper, bvh->centre), v3_sub(bvh->centre, bvh->box.lower));
+    double radius = v3_length(half);
+    int exponent = 0;
+    (void)frexp(radius, &exponent); /* radius < 2^exponent */
+    bvh->scale = radius > 0.0 ? ldexp(1.0, exponent < -1000 ? 1000 : -exponent) : 1.0;
+    double pad = BOUNDS_PAD / bvh->scale;
+    bvh->half = v3_add(half, v3(pad, pad, pad));
+}
+
+static void embree_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+    const accel_bvh *bvh = args->geometryUserPtr;
+    struct RTCBounds *out = args->bounds_o;
+    accel_box box;
+    if (!bvh->bounds(bvh->user, args->primID, &box)) {
+        /* Embree leaves out primitives whose box is empty. */
+        out->lower_x = out->lower_y = out->lower_z = INFINITY;
+        out->upper_x = out->upper_y = out->upper_z = -INFINITY;
+        return;
+    }
+    vec3 lower = v3_scale(v3_sub(box.lower, bvh->centre), bvh->scale);
+    vec3 upper = v3_scale(v3_sub(box.upper, bvh->centre), bvh->scale);
+    out->lower_x = (float)(lower.x - PRIMITIVE_PAD);
+    out->lower_y = (float)(lower.y - PRIMITIVE_PAD);
+    out->lower_z = (float)(lower.z - PRIMITIVE_PAD);
+    out->upper_x = (float)(upper.x + PRIMITIVE_PAD);
+    out->upper_y = (float)(upper.y + PRIMITIVE_PAD);
+    out->upper_z = (float)(upper.z + PRIMITIVE_PAD);
+}
+
+static float embree_tfar(const query *q)
+{
+    /* t itself has been rounded, which far along a ray is more than the float's last place. */
+    double slack = 0x1p-50 * (fabs(q->tmax) + fabs(q->t0));
+    double tau = ((q->tmax - q->t0) + slack) * q->rate;
+    return tau >= (double)FLT_MAX ? FLT_MAX : knurl_embree_float_above(tau);
+}
+
+/* Returns the new tfar, or -infinity when the traversal is to end. */
+static float visit_one(query *q, uint32_t primitive)
+{
+    double tmax = q->visit(q->user, primitive, q->tmax);
+    if (tmax < q->tmax) q->tmax = tmax;
+    return q->tmax >= q->t0 ? embree_tfar(q) : -INFINITY;
+}
+
+static void embree_intersect(const struct RTCIntersectFunctionNArguments *args)
+{
+    if (!args->valid[0]) return;
+    struct RTCRay *ray = (struct RTCRay *)(void *)args->rayhit;
+    float tfar = visit_one((query *)(void *)args->context, args->primID);
+#if KNURL_EMBREE_VERSION >= 4
+    args->valid[0] = tfar < ray->tfar ? -1 : 0;
+#endif
+    if (tfar < ray->tfar) ray->tfar = tfar;
+}
+
+static void embree_occluded(const struct RTCOccludedFunctionNArguments *args)
+{
+    if (!args->valid[0]) return;
+    struct RTCRay *ray = (struct RTCRay *)(void *)args->ray;
+    float tfar = visit_one((query *)(void *)args->context, args->primID);
+#if KNURL_EMBREE_VERSION >= 4
+    args->valid[0] = tfar < 0.0f ? -1 : 0;
+#endif
+    if (tfar < 0.0f) ray->tfar = -INFINITY;
+}
+
+static knurl_status build_scene(accel_bvh *bvh, uint32_t count, const char *what, knurl_error *error)
+{
+    RTCDevice device = bvh->device->device;
+    bvh->scene = rtcNewScene(device);
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+    if (bvh->scene && geometry) {
+        rtcSetSceneFlags(bvh->scene, RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneBuildQuality(bvh->scene, RTC_BUILD_QUALITY_MEDIUM);
+        rtcSetGeometryUserPrimitiveCount(geometry, count);
+        rtcSetGeometryUserData(geometry, bvh);
+        rtcSetGeometryBoundsFunction(geometry, embree_bounds, NULL);
+        rtcSetGeometryIntersectFunction(geometry, embree_intersect);
+        rtcSetGeometryOccludedFunction(geometry, embree_occluded);
+        rtcSetGeometryMask(geometry, 0xFFFFFFFFu);
+        rtcCommitGeometry(geometry);
+        (void)rtcAttachGeometry(bvh->scene, geometry);
+        rtcCommitScene(bvh->scene);
+    }
+    if (geometry) rtcReleaseGeometry(geometry);
+    knurl_status status = accel_device_check(bvh->device, what, error);
+    if (status == KNURL_OK && (!bvh->scene || !geometry))
+        status = knurl_fail(error, KNURL_ERROR_MEMORY, "building %s: Embree gave no scene", what);
+    return status;
+}
+
+knurl_status accel_bvh_create(accel_device *device, uint32_t count, accel_bounds_fn *bounds, const void *user,
+                              const char *what, accel_bvh **out, knurl_error *error)
+{
+    *out = NULL;
+    accel_bvh *bvh = knurl_alloc_zero(device->context, sizeof *bvh);
+    if (!bvh) return knurl_fail_memory(error, sizeof *bvh, what);
+    bvh->device = accel_device_retain(device);
+    bvh->bounds = bounds;
+    bvh->user = user;
+    bvh->box = accel_box_empty();
+    knurl_status status = find_bounds(bvh, count, error);
+    if (status == KNURL_OK && !accel_box_is_empty(&bvh->box)) {
+        set_frame(bvh);
+        status = build_scene(bvh, count, what, error);
+    }
+    if (status != KNURL_OK) {
+        accel_bvh_release(bvh);
+        return status;
+    }
+    *out = bvh;
+    return KNURL_OK;
+}
+
+void accel_bvh_release(accel_bvh *bvh)
+{
+    if (!bvh) return;
+    if (bvh->scene) rtcReleaseScene(bvh->scene);
+    accel_device *device = bvh->device;
+    knurl_free(device->context, bvh);
+    accel_device_release(device);
+}
+
+accel_box accel_bvh_bounds(const accel_bvh *bvh)
+{
+    return bvh->box;
+}
+vec3 accel_bvh_centre(const accel_bvh *bvh)
+{
+    return bvh->centre;
+}
+
+/* ---- Tracing ---------------------------------------------------------------------------------- */
+
+/* Narrows [*t0, *t1] to one slab |o + t d| <= half. */
+static bool clip_axis(double o, double d, double half, double *t0, double *t1)
+{
+    if (d == 0.0) return fabs(o) <= half;
+    double inverse = 1.0 / d;
+    if (!isfinite(inverse)) { /* d is so small that any finite way stays on the spot */
+        return fabs(o) <= half;
+    }
+    double a = (-half - o) * inverse, b = (half - o) * inverse;
+    *t0 = fmax(*t0, fmin(a, b));
+    *t1 = fmin(*t1, fmax(a, b));
+    return *t0 <= *t1;
+}
+
+/* o + t d for o = high + low, with one rounding of the sum that cancels. */
+static double advance(double high, double low, double t, double d)
+{
+    return fma(t, d, high) + low;
+}
+
+/* a - b = *high + *low exactly (Knuth's TwoSum). */
+static void subtract_exactly(double a, double b, double *high, double *low)
+{
+    double s = a - b, bb = s - a;
+    *high = s;
+    *low = (a - (s - bb)) - (b + bb);
+}
+
+bool accel_bvh_clip(const accel_bvh *bvh, vec3 origin, vec3 direction, double tmin, double tmax,
+                    accel_segment *segment)
+{
+    if (!bvh->scene) return false;
+    vec3 high, low;
+    subtract_exactly(origin.x, bvh->centre.x, &high.x, &low.x);
+    subtract_exactly(origin.y, bvh->centre.y, &high.y, &low.y);
+    subtract_exactly(origin.z, bvh->centre.z, &high.z, &low.z);
+    /* Distances to the planes are rounded relative to how far away the ray starts. */
+    double slack = 0x1p-50 * v3_max_component(v3_abs(high));
+    double t0 = tmin, t1 = tmax;
+    if (!clip_axis(high.x, direction.x, bvh->half.x + slack, &t0, &t1) ||
+        !clip_axis(high.y, direction.y, bvh->half.y + slack, &t0, &t1) ||
+        !clip_axis(high.z, direction.z, bvh->half.z + slack, &t0, &t1))
+        return false;
+    segment->direction = direction;
+    segment->t0 = t0;
+    segment->t1 = t1;
+    segment->origin = v3(advance(high.x, low.x, t0, direction.x), advance(high.y, low.y, t0, direction.y),
+                         advance(high.z, low.z, t0, direction.z));
+    return isfinite(t0) && isfinite(t1) && v3_finite(segment->origin);
+}
+
+void accel_bvh_traverse(const accel_bvh *bvh, const accel_segment *segment, double tmax, bool any,
+                        accel_visit_fn *visit, void *user)
+{
+    query q = {.visit = visit, .user = user, .tmax = fmin(tmax, segment->t1), .t0 = segment->t0};
+    if (!(q.tmax >= q.t0)) return;
+    int exponent = 0;
+    (void)frexp(v3_max_component(v3_abs(segment->direction)), &exponent);
+    double shrink = ldexp(1.0, -exponent);
+    vec3 d = v3_scale(segment->direction, shrink), o = v3_scale(segment->origin, bvh->scale);
+    q.rate = bvh->scale / shrink;
+    if (!v3_finite(d) || !isfinite(q.rate) || !(q.rate > 0.0)) return;
+    knurl_embree_init_query(&q.base);
+    struct RTCRayHit ray;
+    memset(&ray, 0, sizeof ray);
+    ray.ray.org_x = (float)o.x, ray.ray.org_y = (float)o.y, ray.ray.org_z = (float)o.z;
+    ray.ray.dir_x = (float)d.x, ray.ray.dir_y = (float)d.y, ray.ray.dir_z = (float)d.z;
+    ray.ray.tfar = embree_tfar(&q);
+    ray.ray.mask = 0xFFFFFFFFu;
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    if (any)
+        knurl_embree_occluded1(bvh->scene, &q.base, &ray.ray);
+    else
+        knurl_embree_intersect1(bvh->scene, &q.base, &ray);
+}

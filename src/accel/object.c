@@ -1,0 +1,154 @@
+/* One object: its hierarchy, and what to do with each primitive the hierarchy offers. */
+#include "accel/object.h"
+
+#include <stdio.h>
+
+static bool surface_bounds(const void *user, uint32_t shell, accel_box *box)
+{
+    float lower[3], upper[3];
+    if (!knurl_surface_shell_bounds(user, shell, lower, upper)) return false;
+    *box = (accel_box){v3_loadf(lower), v3_loadf(upper)};
+    return true;
+}
+
+knurl_status accel_object_build(accel_object *object, accel_device *device, uint32_t number,
+                                knurl_error *error)
+{
+    char what[48];
+    (void)snprintf(what, sizeof what, "the hierarchy of object %u", number);
+    if (object->surface)
+        return accel_bvh_create(device, knurl_surface_shell_count(object->surface), surface_bounds,
+                                object->surface, what, &object->bvh, error);
+    return accel_bvh_create(device, object->mesh->triangle_count, accel_mesh_bounds, object->mesh, what,
+                            &object->bvh, error);
+}
+
+void accel_object_clear(accel_object *object)
+{
+    accel_bvh_release(object->bvh);
+    if (object->surface) knurl_surface_release(object->surface);
+    accel_mesh_release(object->mesh);
+    *object = (accel_object){0};
+}
+
+accel_box accel_object_bounds(const accel_object *object)
+{
+    return accel_bvh_bounds(object->bvh);
+}
+
+bool accel_object_prepare(const accel_object *object, accel_local_ray *local)
+{
+    knurl_ray *ray = &local->ray;
+    if (!accel_bvh_clip(object->bvh, v3_load(ray->origin), v3_load(ray->direction), ray->tmin, ray->tmax,
+                        &local->segment))
+        return false;
+    if (object->surface && (ray->cone_width > 0.0f || ray->cone_spread > 0.0f)) {
+        float lod = (float)knurl_surface_cone_lod(object->surface, ray, local->segment.t0);
+        if (lod > ray->lod) ray->lod = lod;
+    }
+    ray->cone_width = ray->cone_spread = 0.0f;
+    return true;
+}
+
+typedef struct trace {
+    const accel_object *object;
+    knurl_ray ray;     /* displaced surfaces: tmax shrinks */
+    accel_shear shear; /* plain meshes */
+    knurl_hit *hit;
+    double t;
+    double ab[2];
+    uint32_t triangle; /* of the nearest hit so far */
+    uint32_t steps;
+} trace;
+
+static void start_trace(trace *s, const accel_object *object, const accel_local_ray *local)
+{
+    s->object = object;
+    s->triangle = KNURL_NO_HIT;
+    s->steps = 0;
+    s->t = INFINITY;
+    s->ray = local->ray;
+    if (object->mesh) accel_shear_make(&local->segment, accel_bvh_centre(object->bvh), &s->shear);
+}
+
+/* Which of two hits counts must not depend on the order in which Embree offers primitives. */
+static bool is_nearer(const trace *s, double t, uint32_t triangle)
+{
+    return t < s->t || (t == s->t && triangle < s->triangle);
+}
+
+static double visit_shell(void *user, uint32_t shell, double tmax)
+{
+    trace *s = user;
+    knurl_hit hit;
+    hit.steps = 0;
+    s->ray.tmax = tmax;
+    bool found = knurl_surface_intersect(s->object->surface, shell, &s->ray, &hit);
+    s->steps += hit.steps;
+    if (!found) return tmax;
+    if (is_nearer(s, hit.t, shell)) {
+        s->t = hit.t;
+        s->triangle = shell;
+        *s->hit = hit;
+    }
+    return s->t;
+}
+
+static double visit_triangle(void *user, uint32_t triangle, double tmax)
+{
+    trace *s = user;
+    double t, ab[2];
+    s->steps++;
+    if (!accel_mesh_intersect(s->object->mesh, triangle, &s->shear, s->ray.tmin, tmax, &t, ab)) return tmax;
+    if (is_nearer(s, t, triangle)) {
+        s->t = t;
+        s->triangle = triangle;
+        s->ab[0] = ab[0];
+        s->ab[1] = ab[1];
+    }
+    return s->t;
+}
+
+bool accel_object_intersect(const accel_object *object, const accel_local_ray *local, double tmax,
+                            knurl_hit *hit, uint32_t *steps)
+{
+    trace s;
+    start_trace(&s, object, local);
+    s.hit = hit;
+    accel_bvh_traverse(object->bvh, &local->segment, tmax, false,
+                       object->surface ? visit_shell : visit_triangle, &s);
+    *steps += s.steps;
+    if (s.triangle == KNURL_NO_HIT) return false;
+    if (object->mesh) {
+        hit->t = s.t;
+        accel_mesh_fill_hit(object->mesh, s.triangle, s.ab, hit);
+    }
+    return true;
+}
+
+static double any_shell(void *user, uint32_t shell, double tmax)
+{
+    trace *s = user;
+    if (!knurl_surface_occluded(s->object->surface, shell, &s->ray)) return tmax;
+    s->triangle = shell;
+    return -INFINITY;
+}
+
+static double any_triangle(void *user, uint32_t triangle, double tmax)
+{
+    trace *s = user;
+    double t, ab[2];
+    if (!accel_mesh_intersect(s->object->mesh, triangle, &s->shear, s->ray.tmin, s->ray.tmax, &t, ab))
+        return tmax;
+    s->triangle = triangle;
+    return -INFINITY;
+}
+
+bool accel_object_occluded(const accel_object *object, const accel_local_ray *local)
+{
+    trace s;
+    start_trace(&s, object, local);
+    accel_bvh_traverse(object->bvh, &local->segment, local->ray.tmax, true,
+                       object->surface ? any_shell : any_triangle, &s);
+    return s.triangle != KNURL_NO_HIT;
+}
