@@ -18,7 +18,7 @@ void height_lod_make(const shell_space *space, double lod, height_lod *out)
     out->ratio[1] = (double)out->level[1]->height / (double)out->level[0]->height;
     out->to_map[0] = (double)map->levels[0].width / (double)out->level[0]->width;
     out->to_map[1] = (double)map->levels[0].height / (double)out->level[0]->height;
-    heightmap_lod_margin(map, lod, out->margin);
+    out->lod = lod;
 }
 
 /* Texel coordinates of the vertices, relative to the integer texel below their centre. Multiples of
@@ -135,10 +135,9 @@ knurl_range shell_height_range(const shell_space *space, const height_lod *lod, 
 {
     double sx = lod->to_map[0], sy = lod->to_map[1];
     double ox = (double)frame->origin_x + 0.5, oy = (double)frame->origin_y + 0.5;
-    knurl_range raw =
-        heightmap_bounds_texels(space->map, kind, (x0 + ox) * sx - 0.5 - lod->margin[0],
-                                (y0 + oy) * sy - 0.5 - lod->margin[1], (x1 + ox) * sx - 0.5 + lod->margin[0],
-                                (y1 + oy) * sy - 0.5 + lod->margin[1], space->wrap_u, space->wrap_v);
+    knurl_range raw = heightmap_bounds_texels_lod(
+        space->map, kind, (x0 + ox) * sx - 0.5, (y0 + oy) * sy - 0.5, (x1 + ox) * sx - 0.5,
+        (y1 + oy) * sy - 0.5, space->wrap_u, space->wrap_v, lod->lod);
     double a = space->offset + space->factor * raw.min, b = space->offset + space->factor * raw.max;
     double rounding = 4.0 * DBL_EPSILON * (fabs(a) + fabs(b));
     return (knurl_range){min_d(a, b) - rounding, max_d(a, b) + rounding};

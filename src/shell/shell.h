@@ -49,7 +49,7 @@ typedef struct height_lod {
     const height_level *level[2];
     double blend;     /* 0: level[1] is not read */
     double ratio[2];  /* texel coordinate of level 1: x1 = (x0 + 0.5) ratio - 0.5 */
-    double margin[2]; /* growth of bound queries, in texels of level 0 of the map */
+    double lod;       /* clamped to the map's levels */
     double to_map[2]; /* texel of the map's level 0 per texel of level[0] */
 } height_lod;
 

@@ -1,0 +1,40 @@
+/* data/height.h: one level of a height map, and how indices wrap. */
+#ifndef KNURL_SRC_DATA_HEIGHT_H
+#define KNURL_SRC_DATA_HEIGHT_H
+
+#include <knurl/heightmap.h>
+
+/* Samples of one level, row-major. Texel coordinates: x = u * width - 0.5, so sample i sits at
+ * x = i, and cell i of the bilinear signal is [i, i + 1]. */
+typedef struct height_level {
+    int32_t width, height;
+    knurl_pixel_format format;
+    const void *samples; /* width * height, one channel */
+} height_level;
+
+/* Sample (x, y), x in [0, width), y in [0, height), scaled as the format says. */
+static inline double height_fetch(const height_level *level, int32_t x, int32_t y)
+{
+    size_t i = (size_t)y * (size_t)level->width + (size_t)x;
+    switch (level->format) {
+    case KNURL_PIXEL_U8:
+        return (double)((const uint8_t *)level->samples)[i] / 255.0;
+    case KNURL_PIXEL_U16:
+        return (double)((const uint16_t *)level->samples)[i] / 65535.0;
+    default:
+        return (double)((const float *)level->samples)[i];
+    }
+}
+
+/* Index of the sample that stands at integer position i of the wrapped signal, |i| < 2^62. */
+static inline int32_t height_wrap(int64_t i, int32_t size, knurl_wrap wrap)
+{
+    if (i >= 0 && i < size) return (int32_t)i;
+    if (wrap == KNURL_WRAP_CLAMP) return i < 0 ? 0 : size - 1;
+    int64_t period = wrap == KNURL_WRAP_MIRROR ? 2 * (int64_t)size : size;
+    int64_t r = i % period;
+    if (r < 0) r += period;
+    return (int32_t)(r < size ? r : period - 1 - r);
+}
+
+#endif
