@@ -44,13 +44,19 @@ knurl_status knurl_fail_prefix(knurl_error *error, knurl_status status, const ch
     if (error) {
         char old[sizeof error->message];
         memcpy(old, error->message, sizeof old);
+        old[sizeof old - 1] = 0;
         va_list args;
         va_start(args, format);
         int length = vsnprintf(error->message, sizeof error->message, format, args);
         va_end(args);
         error->status = status;
-        if (length >= 0 && (size_t)length < sizeof error->message - 1)
-            (void)snprintf(error->message + length, sizeof error->message - (size_t)length, ": %s", old);
+        /* Joined by hand: what does not fit is cut, which is meant. */
+        size_t used = length < 0 ? 0 : (size_t)length;
+        for (const char *from = ": "; used + 1 < sizeof error->message && *from;)
+            error->message[used++] = *from++;
+        for (const char *from = old; used + 1 < sizeof error->message && *from;)
+            error->message[used++] = *from++;
+        if (used < sizeof error->message) error->message[used] = 0;
     }
     return status;
 }
