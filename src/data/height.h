@@ -26,6 +26,27 @@ static inline double height_fetch(const height_level *level, int32_t x, int32_t 
     }
 }
 
+/* Raw samples at two columns by two rows: (0,0), (1,0), (0,1), (1,1). Returns the scale that makes
+ * values of them, so that a caller with a factor of its own multiplies once. */
+static inline double height_fetch_cell(const height_level *level, const int32_t columns[2],
+                                       const int32_t rows[2], double raw[4])
+{
+    size_t top = (size_t)rows[0] * (size_t)level->width, bottom = (size_t)rows[1] * (size_t)level->width;
+    size_t at[4] = {top + (size_t)columns[0], top + (size_t)columns[1], bottom + (size_t)columns[0],
+                    bottom + (size_t)columns[1]};
+    switch (level->format) {
+    case KNURL_PIXEL_U8:
+        for (int i = 0; i < 4; i++) raw[i] = (double)((const uint8_t *)level->samples)[at[i]];
+        return 1.0 / 255.0;
+    case KNURL_PIXEL_U16:
+        for (int i = 0; i < 4; i++) raw[i] = (double)((const uint16_t *)level->samples)[at[i]];
+        return 1.0 / 65535.0;
+    default:
+        for (int i = 0; i < 4; i++) raw[i] = (double)((const float *)level->samples)[at[i]];
+        return 1.0;
+    }
+}
+
 /* Index of the sample that stands at integer position i of the wrapped signal, |i| < 2^62. */
 static inline int32_t height_wrap(int64_t i, int32_t size, knurl_wrap wrap)
 {

@@ -97,13 +97,14 @@ void triangle_frame_load(const shell_space *space, uint32_t triangle, const heig
 static void add_cell(const shell_space *space, const height_level *level, int64_t i, int64_t j, double px,
                      double py, double rx, double ry, double weight, height_patch *patch)
 {
-    int32_t i0 = height_wrap(i, level->width, space->wrap_u),
-            i1 = height_wrap(i + 1, level->width, space->wrap_u);
-    int32_t j0 = height_wrap(j, level->height, space->wrap_v),
-            j1 = height_wrap(j + 1, level->height, space->wrap_v);
-    double k = space->factor * weight, o = space->offset * weight;
-    double h00 = o + k * height_fetch(level, i0, j0), h10 = o + k * height_fetch(level, i1, j0);
-    double h01 = o + k * height_fetch(level, i0, j1), h11 = o + k * height_fetch(level, i1, j1);
+    int32_t columns[2] = {height_wrap(i, level->width, space->wrap_u),
+                          height_wrap(i + 1, level->width, space->wrap_u)};
+    int32_t rows[2] = {height_wrap(j, level->height, space->wrap_v),
+                       height_wrap(j + 1, level->height, space->wrap_v)};
+    double raw[4];
+    double k = space->factor * weight * height_fetch_cell(level, columns, rows, raw),
+           o = space->offset * weight;
+    double h00 = o + k * raw[0], h10 = o + k * raw[1], h01 = o + k * raw[2], h11 = o + k * raw[3];
     double ax = h10 - h00, ay = h01 - h00, axy = (h11 - h01) - ax;
     patch->c += h00 + ax * px + py * (ay + axy * px);
     patch->cx += (ax + axy * py) * rx;

@@ -153,6 +153,18 @@ static bool excludes_zero(const piece *p, const across *c, double b1, double b2,
     return fabs(value) > most + pad;
 }
 
+/* Unit vector at half the angle of (c, s): the larger of its components first, which does not cancel. */
+static void major_axis(double c, double s, double *w1, double *w2)
+{
+    double r = sqrt(c * c + s * s);
+    *w1 = 1.0;
+    *w2 = 0.0;
+    if (!(r > 0.0)) return;
+    double large = sqrt(0.5 * (r + fabs(c)) / r), small = 0.5 * s / (r * large);
+    *w1 = c >= 0.0 ? large : fabs(small);
+    *w2 = c >= 0.0 ? small : copysign(large, s);
+}
+
 /* Near a tangency the surface seen along the ray is thin in one direction: the left singular vector of
  * the smaller singular value of the derivative. Testing along it keeps the number of pieces bounded,
  * where boxes alone would need ever more of them. */
@@ -162,7 +174,8 @@ static verdict judge(const search *s, const piece *p, const height_patch *patch,
     double spread = derivative_spread(s, p, patch, c);
     double xx = c->a1 * c->a1 + c->c1 * c->c1, yy = c->a2 * c->a2 + c->c2 * c->c2,
            xy = c->a1 * c->a2 + c->c1 * c->c2;
-    double angle = 0.5 * atan2(2.0 * xy, xx - yy), w1 = cos(angle), w2 = sin(angle);
+    double w1, w2;
+    major_axis(xx - yy, 2.0 * xy, &w1, &w2);
     double thin, wide;
     if (excludes_zero(p, c, b1, b2, -w2, w1, spread, s->pad, &thin)) return EXCLUDED;
     if (excludes_zero(p, c, b1, b2, w1, w2, spread, s->pad, &wide)) return EXCLUDED;
