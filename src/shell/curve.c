@@ -1,12 +1,13 @@
 /* The explicit ray curve; see curve.h. */
 #include "shell/curve.h"
 
-#include <string.h>
-
 /* A ray whose sine against the offset plane it starts in is under this is followed by depth.
- * By height, rounding is amplified by 1 / sine: to 1e-11 here. By depth, the curve is cut after its
- * quadratic term, an error of order sine^2: to 1e-10 here. */
+ * By height, rounding is amplified by 1 / sine: to 1e-11 here. By depth, the quadratics leave a
+ * remainder of order sine^2: 1e-10 here, which Newton steps take away again. */
 static const double GRAZING_SINE = 1e-5;
+/* Followed by height with W above this fraction of the offset triangle's area, points are exact to a few
+ * hundred roundings as they are. */
+static const double STEEP_SINE = 1e-2;
 /* Followed by height, a stretch must end at a side or at the height range, before W falls to this
  * fraction of the offset triangle's area; where it does not, the shell is nearly folded and the curve
  * is declared unreliable. */
@@ -127,12 +128,11 @@ static bool invert_point(const triangle_frame *f, vec3 point, vec3 *q)
     return false;
 }
 
-/* Curve by depth, from the ray's point nearest to the triangle's centre: value, tangent J c' = D and
- * bend J c'' = -2 s' (N_x x' + N_y y'). */
-static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_ray *ray, vec3 start,
-                        ray_curve *c)
+/* Curve by depth, around the ray's point at depth `center`, with `start` near its inverse: value, tangent J
+ * c' = D and bend J c'' = -2 s' (N_x x' + N_y y'). */
+static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_ray *ray, double center,
+                        vec3 start, ray_curve *c)
 {
-    double center = (v->p[0].z + v->p[1].z + v->p[2].z) / 3.0;
     vec3 relative = v3_sub(v3_load(ray->origin), f->base);
     vec3 q = start, ja, jb, js, tangent, bend;
     if (!invert_point(f, v3_mad(relative, center, v->along), &q)) return false;
@@ -141,6 +141,7 @@ static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_
     vec3 turn = v3_scale(v3_mad(v3_scale(f->ne, tangent.x), tangent.y, f->nf), -2.0 * tangent.z);
     if (!solve3(ja, jb, js, turn, &bend)) return false;
     c->by_depth = true;
+    c->refine = !(f->flags & SHELL_CONSTANT_NORMAL);
     c->depth_origin = center / v->length;
     c->depth_scale = 1.0 / v->length;
     c->w = (quadratic){{1.0, 0.0, 0.0}};
@@ -150,13 +151,31 @@ static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_
     return true;
 }
 
-/* Bound on the error of b by rounding, for the curve by depth of an affine shell. */
-static double affine_rounding(const triangle_frame *f, const ray_view *v)
+/* Bound on the error of b by rounding, for points that are inverted at a known t: the rounding of the
+ * ray's point and of the shell's, through the inverse of J at `near`. */
+static double inversion_rounding(const triangle_frame *f, const ray_view *v, vec3 near)
 {
-    double det = v3_det(f->pe, f->pf, f->n[0]);
-    double amplification = v3_length(v3_cross(f->pe, f->pf)) + v3_length(v3_cross(f->pf, f->n[0])) +
-                           v3_length(v3_cross(f->pe, f->n[0]));
-    return (v->p_rounding + 16.0 * DBL_EPSILON * f->size) * amplification / fabs(det) + 16.0 * DBL_EPSILON;
+    vec3 ja, jb, js;
+    shell_columns(f, near, &ja, &jb, &js);
+    double amplification =
+        v3_length(v3_cross(ja, jb)) + v3_length(v3_cross(jb, js)) + v3_length(v3_cross(ja, js));
+    double reach = f->size + max_d(fabs(f->s0), fabs(f->s1));
+    return (v->p_rounding + 16.0 * DBL_EPSILON * reach) * amplification / fabs(v3_det(ja, jb, js)) +
+           16.0 * DBL_EPSILON;
+}
+
+curve_point curve_at_refined(const ray_curve *c, double p)
+{
+    const triangle_frame *f = c->frame;
+    double inverse = c->by_depth ? 1.0 : 1.0 / quadratic_at(&c->w, p);
+    vec3 q = v3(quadratic_at(&c->b1, p) * inverse, quadratic_at(&c->b2, p) * inverse,
+                c->by_depth ? quadratic_at(&c->s, p) : p);
+    vec3 ja, jb, js, step;
+    shell_columns(f, q, &ja, &jb, &js);
+    vec3 point = v3_mad(c->origin, curve_depth(c, p), c->direction);
+    if (solve3(ja, jb, js, v3_sub(point, shell_point(f, q)), &step)) q = v3_add(q, step);
+    return (curve_point){q.x, q.y, q.z, f->x[0] + q.x * f->xe + q.y * f->xf,
+                         f->y[0] + q.x * f->ye + q.y * f->yf};
 }
 
 /* One condition on the parameter: value(p) >= -allowance. */
@@ -191,7 +210,64 @@ static void add_interval(ray_curve *c, double a, double b)
     double ta = curve_depth(c, a), tb = curve_depth(c, b);
     bool forward = ta <= tb;
     c->intervals[c->interval_count++] =
-        forward ? (curve_interval){a, b, ta, tb} : (curve_interval){b, a, tb, ta};
+        forward ? (curve_interval){a, b, ta, tb, 0.0, 0.0} : (curve_interval){b, a, tb, ta, 0.0, 0.0};
+}
+
+/* The three side conditions at a point of the curve: barycentrics. */
+static double barycentric(const curve_point *at, int side)
+{
+    return side == 0 ? 1.0 - at->b1 - at->b2 : side == 1 ? at->b1 : at->b2;
+}
+
+/* Which side an end of a stretch lies on, by the barycentric that is nearest to zero there. */
+static int nearest_side(const curve_point *at)
+{
+    int side = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabs(barycentric(at, i)) < fabs(barycentric(at, side))) side = i;
+    return side;
+}
+
+/* Moves an end that lies on a side to where the curve's points (not only the quadratics) pass it by the
+ * rounding of b, and sets its zone. `inwards` is a short step into the stretch. */
+static double settle_end(const ray_curve *c, double p, double inwards, double *zone)
+{
+    curve_point at = curve_at(c, p), inside = curve_at(c, p + inwards);
+    int side = nearest_side(&at);
+    double e = c->barycentric_rounding, value = barycentric(&at, side);
+    double slope = (barycentric(&inside, side) - value) / inwards;
+    *zone = 0.0;
+    if (fabs(value) > 1e-5 || slope == 0.0) return p; /* an end of the height range */
+    if (c->refine)
+        for (int i = 0; i < 3; i++) {
+            double step = (barycentric(&at, side) + e) / slope;
+            if (!(fabs(step) <= fabs(inwards))) break;
+            p -= step;
+            at = curve_at(c, p);
+        }
+    *zone = min_d(2.0 * e / fabs(slope), fabs(inwards));
+    return p;
+}
+
+/* Settles both ends of every stretch, and drops stretches that the curve's points do not confirm: with
+ * the quadratics alone the search was wider than rounding. */
+static void settle_intervals(ray_curve *c)
+{
+    int kept = 0;
+    for (int i = 0; i < c->interval_count; i++) {
+        curve_interval s = c->intervals[i];
+        double inwards = 1e-3 * (s.out - s.in);
+        if (inwards != 0.0) {
+            double in = settle_end(c, s.in, inwards, &s.zone_in),
+                   out = settle_end(c, s.out, -inwards, &s.zone_out);
+            s = (curve_interval){in, out, curve_depth(c, in), curve_depth(c, out), s.zone_in, s.zone_out};
+        }
+        curve_point at = curve_at(c, 0.5 * (s.in + s.out));
+        double least = min_d(barycentric(&at, 0), min_d(barycentric(&at, 1), barycentric(&at, 2)));
+        if (c->refine && (s.t_in > s.t_out || least < -2.0 * c->barycentric_rounding)) continue;
+        c->intervals[kept++] = s;
+    }
+    c->interval_count = kept;
 }
 
 /* Stretches of [lo, hi] where all conditions hold. Cuts at the conditions' roots and tests midpoints
@@ -229,8 +305,8 @@ static double side_allowance(const triangle_frame *f, const ray_view *v)
     return 4.0 * reach * v->p_rounding + 32.0 * DBL_EPSILON * reach * reach;
 }
 
-/* By height, W > 0 and W < 0 are separate cases: q_i >= 0 or q_i <= 0. */
-static void height_intervals(ray_curve *c, const triangle_frame *f, const ray_view *v, double area)
+/* By height, W > 0 and W < 0 are separate cases: q_i >= 0 or q_i <= 0. Returns the least |W| there. */
+static double height_intervals(ray_curve *c, const triangle_frame *f, const ray_view *v, double area)
 {
     double allowance = side_allowance(f, v), w_floor = LEAST_SINE * area, bernstein[3];
     quadratic b0 = combine(c, 1.0, -1.0, -1.0);
@@ -258,11 +334,46 @@ static void height_intervals(ray_curve *c, const triangle_frame *f, const ray_vi
     }
     if (w_least < 1.001 * w_floor) c->unreliable = true;
     c->barycentric_rounding = c->interval_count ? 2.0 * allowance / w_least + 16.0 * DBL_EPSILON : 0.0;
+    return w_least;
+}
+
+/* Distance in texels that an error e of b can make. */
+static double texel_error(const triangle_frame *f, double e)
+{
+    return e * (fabs(f->xe) + fabs(f->xf) + fabs(f->ye) + fabs(f->yf));
+}
+
+/* After height_intervals: where a small W amplified rounding, points are inverted instead. */
+static void settle_height(ray_curve *c, const triangle_frame *f, const ray_view *v, bool steep)
+{
+    if (!steep && c->interval_count) {
+        curve_point near = curve_at(c, 0.5 * (c->intervals[0].in + c->intervals[0].out));
+        c->texel_remainder = texel_error(f, c->barycentric_rounding);
+        c->barycentric_rounding = inversion_rounding(f, v, v3(near.b1, near.b2, near.s));
+        c->refine = true;
+    }
+    settle_intervals(c);
+}
+
+/* How far the quadratics are from the exact curve at the ends of its stretches, which is where they
+ * are worst; false if it is so far that a single Newton step is not enough. */
+static bool measure_remainder(const ray_curve *c, double *worst)
+{
+    *worst = 0.0;
+    for (int i = 0; i < c->interval_count; i++)
+        for (int end = 0; end < 2; end++) {
+            double p = end ? c->intervals[i].out : c->intervals[i].in;
+            curve_point at = curve_at(c, p);
+            *worst = max_d(
+                *worst, max_d(fabs(at.b1 - quadratic_at(&c->b1, p)), fabs(at.b2 - quadratic_at(&c->b2, p))));
+        }
+    return *worst < 1e-7;
 }
 
 static void depth_intervals(ray_curve *c, const triangle_frame *f, double reach)
 {
-    double e = c->barycentric_rounding;
+    /* With a remainder the first search is wide, and then the ends are moved to the exact curve. */
+    double e = c->refine ? 1e-6 : c->barycentric_rounding, worst = 0.0;
     quadratic b0 = combine(c, 1.0, -1.0, -1.0), above = c->s, below = c->s;
     above.c[0] -= f->s0;
     for (int k = 0; k < 3; k++) below.c[k] = -below.c[k];
@@ -270,25 +381,9 @@ static void depth_intervals(ray_curve *c, const triangle_frame *f, double reach)
     double height_error = e * (f->size + fabs(f->s0) + fabs(f->s1));
     condition conditions[5] = {{b0, e}, {c->b1, e}, {c->b2, e}, {above, height_error}, {below, height_error}};
     find_intervals(c, conditions, 5, -reach, reach);
-}
-
-/* How far the quadratic curve by depth is from the true one at the ends of its intervals. */
-static bool measure_depth_error(const triangle_frame *f, const ray_view *v, const knurl_ray *ray,
-                                ray_curve *c)
-{
-    vec3 relative = v3_sub(v3_load(ray->origin), f->base);
-    double worst = 0.0;
-    for (int i = 0; i < c->interval_count; i++)
-        for (int end = 0; end < 2; end++) {
-            double p = end ? c->intervals[i].out : c->intervals[i].in;
-            vec3 predicted = v3(quadratic_at(&c->b1, p), quadratic_at(&c->b2, p), quadratic_at(&c->s, p));
-            vec3 q = predicted;
-            double depth = (c->depth_origin + p * c->depth_scale) * v->length;
-            if (!invert_point(f, v3_mad(relative, depth, v->along), &q)) return false;
-            worst = max_d(worst, max_d(fabs(q.x - predicted.x), fabs(q.y - predicted.y)));
-        }
-    c->barycentric_rounding = 4.0 * worst + 1e-12;
-    return worst < 1e-8;
+    if (c->refine && !measure_remainder(c, &worst)) c->unreliable = true;
+    c->texel_remainder = texel_error(f, 4.0 * worst);
+    if (!c->unreliable) settle_intervals(c);
 }
 
 /* Farthest depth, from the ray's point nearest to the centre, that the shell can reach. */
@@ -316,25 +411,66 @@ static void sort_intervals(ray_curve *c)
     }
 }
 
-/* Grazing: the ray's point nearest to the centre is inverted (a cubic's root, found by Newton in the
- * three unknowns), and the sine of the ray against the offset plane through that point decides.
- * Returns false if neither parameter can be trusted. */
-static bool choose_grazing(const triangle_frame *f, const ray_view *v, const knurl_ray *ray, ray_curve *c,
-                           bool *by_depth)
+static double center_depth(const ray_view *v)
 {
-    ray_curve depth = *c;
-    *by_depth = false;
-    if (!depth_curve(f, v, ray, v3(1.0 / 3.0, 1.0 / 3.0, 0.5 * (f->s0 + f->s1)), &depth)) return false;
-    double s = depth.s.c[0];
+    return (v->p[0].z + v->p[1].z + v->p[2].z) / 3.0;
+}
+
+static void follow_by_depth(const triangle_frame *f, const ray_view *v, ray_curve *c)
+{
+    c->interval_count = 0;
+    c->barycentric_rounding = inversion_rounding(f, v, v3(c->b1.c[0], c->b2.c[0], c->s.c[0]));
+    depth_intervals(c, f, depth_reach(f));
+}
+
+/* The ray's point nearest to the triangle's centre is inverted (a cubic's root, found by Newton in the
+ * three unknowns); the sine of the ray against the offset plane through that point says whether the ray
+ * grazes there. Returns false if the inverse cannot be trusted. */
+static bool grazes_center(const triangle_frame *f, const ray_view *v, const knurl_ray *ray,
+                          const ray_curve *c, ray_curve *depth, bool *grazes)
+{
+    *depth = *c;
+    *grazes = false;
+    vec3 middle = v3(1.0 / 3.0, 1.0 / 3.0, 0.5 * (f->s0 + f->s1));
+    if (!depth_curve(f, v, ray, center_depth(v), middle, depth)) return false;
+    double s = depth->s.c[0];
     double sine = fabs(quadratic_at(&c->w, s));
     vec3 ja = v3_mad(f->pe, s, f->ne), jb = v3_mad(f->pf, s, f->nf);
     if (sine > GRAZING_SINE * v3_length(v3_cross(ja, jb))) return true; /* parallel to a plane elsewhere */
-    /* Far outside the height range Newton may have found another branch: not to be trusted. */
+    /* Far outside the height range Newton may have found another branch. */
     double margin = f->s1 - f->s0 + 0.1 * f->size;
     if (s < f->s0 - margin || s > f->s1 + margin) return false;
-    *c = depth;
-    *by_depth = true;
+    *grazes = true;
     return true;
+}
+
+/* A ray that may graze. The sine changes along it, so that it may graze where it crosses the prism and
+ * not near the centre: the stretches by height tell, and then the curve by depth is taken around them. */
+static void follow_grazing(const triangle_frame *f, const ray_view *v, const knurl_ray *ray, double area,
+                           ray_curve *c)
+{
+    ray_curve depth;
+    bool grazes;
+    if (!grazes_center(f, v, ray, c, &depth, &grazes)) {
+        c->unreliable = true;
+        return;
+    }
+    if (grazes) {
+        *c = depth;
+        follow_by_depth(f, v, c);
+        return;
+    }
+    double w_least = height_intervals(c, f, v, area);
+    if (w_least > GRAZING_SINE * area || c->interval_count == 0) {
+        settle_height(c, f, v, w_least > STEEP_SINE * area);
+        return;
+    }
+    sort_intervals(c);
+    const curve_interval *first = &c->intervals[0], *last = &c->intervals[c->interval_count - 1];
+    double t = 0.5 * (first->t_in + last->t_out);
+    curve_point near = curve_at(c, 0.5 * (first->in + first->out));
+    c->unreliable = !depth_curve(f, v, ray, t * v->length, v3(near.b1, near.b2, near.s), c);
+    if (!c->unreliable) follow_by_depth(f, v, c);
 }
 
 /* Twice the area of the larger of the offset triangles at both ends of the height range. */
@@ -350,37 +486,29 @@ void ray_curve_make(const triangle_frame *f, const knurl_ray *ray, ray_curve *c)
     ray_view v;
     view_make(f, ray, &v);
     c->interval_count = 0;
-    c->by_depth = c->unreliable = false;
+    c->by_depth = c->refine = c->unreliable = false;
+    c->texel_remainder = 0.0;
+    c->frame = f;
+    c->origin = v3_sub(v3_load(ray->origin), f->base);
+    c->direction = v3_load(ray->direction);
     for (int i = 0; i < 3; i++) {
         c->depth_p[i] = v.p[i].z / v.length;
         c->depth_n[i] = v.n[i].z / v.length;
     }
     if (f->flags & SHELL_CONSTANT_NORMAL) {
-        if (!depth_curve(f, &v, ray, v3(0.0, 0.0, 0.0), c)) {
-            c->unreliable = true;
-            return;
-        }
-        c->barycentric_rounding = affine_rounding(f, &v);
-        depth_intervals(c, f, depth_reach(f));
-        make_texel_coordinates(f, c);
-        return;
-    }
-    quadratic q0 = side_quadratic(&v, 1, 2);
-    c->b1 = side_quadratic(&v, 2, 0);
-    c->b2 = side_quadratic(&v, 0, 1);
-    for (int k = 0; k < 3; k++) c->w.c[k] = q0.c[k] + c->b1.c[k] + c->b2.c[k];
-    double area = largest_area(f);
-    bool by_depth = false;
-    if (may_graze(c, f, GRAZING_SINE * area) && !choose_grazing(f, &v, ray, c, &by_depth)) {
-        c->unreliable = true;
-        return;
-    }
-    if (by_depth) {
-        c->barycentric_rounding = 1e-9;
-        depth_intervals(c, f, depth_reach(f));
-        if (!measure_depth_error(f, &v, ray, c)) c->unreliable = true;
+        c->unreliable = !depth_curve(f, &v, ray, center_depth(&v), v3(0.0, 0.0, 0.0), c);
+        if (c->unreliable) return;
+        follow_by_depth(f, &v, c);
     } else {
-        height_intervals(c, f, &v, area);
+        quadratic q0 = side_quadratic(&v, 1, 2);
+        c->b1 = side_quadratic(&v, 2, 0);
+        c->b2 = side_quadratic(&v, 0, 1);
+        for (int k = 0; k < 3; k++) c->w.c[k] = q0.c[k] + c->b1.c[k] + c->b2.c[k];
+        double area = largest_area(f);
+        if (may_graze(c, f, GRAZING_SINE * area))
+            follow_grazing(f, &v, ray, area, c);
+        else
+            settle_height(c, f, &v, height_intervals(c, f, &v, area) > STEEP_SINE * area);
         sort_intervals(c);
     }
     make_texel_coordinates(f, c);
@@ -411,7 +539,7 @@ double curve_invert(const ray_curve *c, double in, double out, double t)
     return p;
 }
 
-double curve_cross(const ray_curve *c, const quadratic *coordinate, double k, double a, double b)
+static double cross_quadratic(const ray_curve *c, const quadratic *coordinate, double k, double a, double b)
 {
     quadratic q = {{coordinate->c[0] - k * c->w.c[0], coordinate->c[1] - k * c->w.c[1],
                     coordinate->c[2] - k * c->w.c[2]}};
@@ -436,6 +564,20 @@ double curve_cross(const ray_curve *c, const quadratic *coordinate, double k, do
             b = middle;
     }
     return 0.5 * (a + b);
+}
+
+double curve_cross(const ray_curve *c, const quadratic *coordinate, double k, double a, double b)
+{
+    double p = cross_quadratic(c, coordinate, k, a, b);
+    for (int i = 0; c->refine && i < 2; i++) {
+        curve_point at = curve_at(c, p);
+        double w = quadratic_at(&c->w, p), value = (coordinate == &c->x ? at.x : at.y) - k;
+        double slope = (quadratic_slope(coordinate, p) - k * quadratic_slope(&c->w, p)) / w;
+        double moved = p - value / slope;
+        if (!(moved >= min_d(a, b) && moved <= max_d(a, b))) break;
+        p = moved;
+    }
+    return p;
 }
 
 int curve_turning_points(const ray_curve *c, const quadratic *coordinate, double a, double b,

@@ -8,8 +8,12 @@
  * and turning points are the roots of x' W - x W', which is quadratic too.
  *
  * Where the ray nearly lies in an offset plane (W close to 0 along all of it), s is a bad
- * parameter and the depth t a good one: there b and s are quadratics of t, and W = 1. Triangles with
- * one constant normal always use t: shell space is then affine and the curve a line. */
+ * parameter and the depth t a good one: there b and s are quadratics of t up to a small remainder, and
+ * W = 1. Triangles with one constant normal always use t: shell space is then affine, the curve a line.
+ *
+ * Where either form is not exact to rounding (a remainder, or a small W that amplifies rounding), the
+ * quadratics only say where to look, and a Newton step of the inversion at the parameter's t says what is
+ * there. */
 #ifndef KNURL_SRC_SHELL_CURVE_H
 #define KNURL_SRC_SHELL_CURVE_H
 
@@ -19,22 +23,28 @@
 enum { CURVE_MAX_INTERVALS = 8 };
 
 /* A stretch of the curve inside the prism. in -> out follows the ray (t grows); in may be the
- * larger parameter. */
+ * larger parameter. An end at a side of the prism lies past the side by the rounding of the side's
+ * place; `zone` is how far inwards, as a parameter step, the side may truly be. 0 at other ends. */
 typedef struct curve_interval {
     double in, out;
     double t_in, t_out;
+    double zone_in, zone_out;
 } curve_interval;
 
 typedef struct ray_curve {
     quadratic w, b1, b2;           /* b = (b1, b2) / w */
     quadratic x, y;                /* texel coordinates times w */
     quadratic s;                   /* unnormalised height; used only when by_depth */
-    bool by_depth;                 /* parameter is t - t0 over the ray's length unit, else s */
+    bool by_depth;                 /* parameter is the depth from depth_origin in object lengths, else s */
+    bool refine;                   /* points take a Newton step */
+    const triangle_frame *frame;   /* for the step */
+    vec3 origin, direction;        /* the ray, relative to vertex 0 */
     double depth_p[3], depth_n[3]; /* depth of P_i - O and N_i along the ray, in ray parameter units */
     double depth_origin;           /* by_depth: t = depth_origin + parameter * depth_scale */
     double depth_scale;
     double barycentric_rounding;                   /* bound on the error of b along the intervals */
-    double texel_rounding;                         /* bound on the error of x and y */
+    double texel_rounding;                         /* bound on the error of x and y at a parameter */
+    double texel_remainder;                        /* how far the quadratics x and y may be from that */
     curve_interval intervals[CURVE_MAX_INTERVALS]; /* front to back */
     int interval_count;
     bool unreliable; /* could not be followed: use shell_subdivide() */
@@ -44,11 +54,14 @@ typedef struct curve_point {
     double b1, b2, s, x, y;
 } curve_point;
 
-/* Finds the curve and its stretches inside the prism. */
+/* Finds the curve and its stretches inside the prism. The curve refers to the frame. */
 void ray_curve_make(const triangle_frame *frame, const knurl_ray *ray, ray_curve *curve);
+
+curve_point curve_at_refined(const ray_curve *curve, double p);
 
 static inline curve_point curve_at(const ray_curve *c, double p)
 {
+    if (c->refine) return curve_at_refined(c, p);
     double inverse = c->by_depth ? 1.0 : 1.0 / quadratic_at(&c->w, p);
     return (curve_point){quadratic_at(&c->b1, p) * inverse, quadratic_at(&c->b2, p) * inverse,
                          c->by_depth ? quadratic_at(&c->s, p) : p, quadratic_at(&c->x, p) * inverse,

@@ -234,6 +234,17 @@ static double g_rounding(const shell_walk *walk, const height_patch *patch)
            32.0 * DBL_EPSILON * (s + max_d(fabs(patch->min), fabs(patch->max)));
 }
 
+/* Bound on what g may be where the next stretch or triangle takes over, if it is zero there. `inwards`
+ * is the sign of the way into the march. */
+static double end_tolerance(const march_state *m, const cell_function *f, sample end, bool first)
+{
+    const curve_interval *s = m->walk->stretch;
+    double zone = first && end.p == s->in ? s->zone_in : !first && end.p == s->out ? s->zone_out : 0.0;
+    if (zone == 0.0) return f->rounding;
+    double inwards = (m->out >= m->in) == first ? zone : -zone;
+    return f->rounding + fabs(g_at(f, end.p + inwards) - end.g);
+}
+
 /* One texel from parameter a to b. */
 static bool visit(march_state *m, double a, double b)
 {
@@ -249,10 +260,11 @@ static bool visit(march_state *m, double a, double b)
     }
     sample start = {a, m->have_carried ? m->carried : g_at(&f, a)};
     sample end = {b, g_at(&f, b)};
-    if (a == m->in && fabs(start.g) <= f.rounding && accept(m->walk, &f, a)) return true;
+    if (a == m->in && fabs(start.g) <= end_tolerance(m, &f, start, true) && accept(m->walk, &f, a))
+        return true;
     if (a != b && leaf(m->walk, &f, start, end)) return true;
     if (a == b && (start.g <= 0.0) != (end.g <= 0.0) && accept(m->walk, &f, a)) return true;
-    if (b == m->out && fabs(end.g) <= f.rounding && accept(m->walk, &f, b)) return true;
+    if (b == m->out && fabs(end.g) <= end_tolerance(m, &f, end, false) && accept(m->walk, &f, b)) return true;
     m->carried = end.g;
     m->have_carried = true;
     return false;

@@ -11,14 +11,16 @@ typedef struct shell_walk {
     const triangle_frame *frame;
     const ray_curve *curve;
     const knurl_ray *ray;
-    shell_root root; /* the hit, once found */
-    uint32_t steps;  /* grows by one per texel visited */
+    const curve_interval *stretch; /* the stretch being walked */
+    shell_root root;               /* the hit, once found */
+    uint32_t steps;                /* grows by one per texel visited */
 } shell_walk;
 
 /* Finds the first root of g = s |N| - h along the curve from parameter `in` to `out`, a stretch
  * where x and y are monotone, with t in the ray's [tmin, tmax]. Visits the texels that the curve
- * crosses in order. Both ends are closed: a g that is zero within rounding there is a hit, because
- * the stretch's neighbour may see the other sign. */
+ * crosses in order. Both ends are closed: a g that is zero within rounding there is a hit, because what
+ * comes next may see the other sign. At a side of the prism that rounding includes how much g changes
+ * over the zone in which the side lies. */
 bool shell_march(shell_walk *walk, double in, double out);
 
 #endif

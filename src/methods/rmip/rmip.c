@@ -115,7 +115,7 @@ static void height_over_normal(const traversal *t, vec3 n, double rx, double ry,
 static bool clip_to_box(const traversal *t, const bound *b, double *t_in, double *t_out)
 {
     const triangle_frame *f = t->walk.frame;
-    double pad = t->walk.curve->texel_rounding;
+    double pad = t->walk.curve->texel_rounding + t->walk.curve->texel_remainder;
     double x0 = min_d(b->x_in, b->x_out) - pad, x1 = max_d(b->x_in, b->x_out) + pad;
     double y0 = min_d(b->y_in, b->y_out) - pad, y1 = max_d(b->y_in, b->y_out) + pad;
     knurl_range h = shell_height_range(t->walk.space, t->walk.lod, t->parameters->bounds, f, x0, y0, x1, y1);
@@ -245,6 +245,7 @@ static bool rmip_intersect(const void *data, const method_query *q)
     for (int i = 0; i < curve.interval_count && !found; i++) {
         curve_interval stretch = curve.intervals[i];
         if (!clip_to_ray(&curve, q->ray, &stretch)) continue;
+        t.walk.stretch = &curve.intervals[i];
         double cuts[6];
         int n = split_at_turns(&curve, stretch.in, stretch.out, cuts);
         for (int k = n - 2; k >= 0; k--) t.stack[t.top++] = make_bound(&curve, cuts[k], cuts[k + 1]);
