@@ -77,7 +77,7 @@ static void set_frame(accel_bvh *bvh)
 {
     vec3 middle = v3_mad(v3_scale(bvh->box.lower, 0.5), 0.5, bvh->box.upper);
     /* Float coordinates, so that subtracting the centre from a float vertex is exact in double. */
-    bvh->centre = v3((double)(float)middle.x, (double)(float)middle.y, (double)(float)middle.z);
+    bvh->centre = v3((double)to_float(middle.x), (double)to_float(middle.y), (double)to_float(middle.z));
     vec3 half = v3_max(v3_sub(bvh->box.upper, bvh->centre), v3_sub(bvh->centre, bvh->box.lower));
     double radius = v3_length(half);
     int exponent = 0;

@@ -5,6 +5,14 @@
 #include <math.h>
 #include <stdbool.h>
 
+/* Rounds to float. Through memory, because GCC 12 at -O2 may drop the rounding of (double)(float)x when
+ * it vectorises a group of them. */
+static inline float to_float(double x)
+{
+    volatile float f = (float)x;
+    return f;
+}
+
 /* One instruction each, unlike fmin and fmax, which must tell NaN apart: if one argument is NaN the
  * result is b. */
 static inline double min_d(double a, double b)
@@ -14,6 +22,17 @@ static inline double min_d(double a, double b)
 static inline double max_d(double a, double b)
 {
     return a > b ? a : b;
+}
+
+/* floor and ceil for |x| < 2^62, without the library call that they are where SSE 4.1 cannot be assumed. */
+static inline double floor_d(double x)
+{
+    double whole = (double)(long long)x;
+    return whole > x ? whole - 1.0 : whole;
+}
+static inline double ceil_d(double x)
+{
+    return -floor_d(-x);
 }
 
 typedef struct vec2 {

@@ -12,13 +12,13 @@ static const double LEAST_NORMAL = 1e-3;
 
 static float round_down(double x)
 {
-    float f = (float)x;
+    float f = to_float(x);
     return (double)f > x ? nextafterf(f, -INFINITY) : f;
 }
 
 static float round_up(double x)
 {
-    float f = (float)x;
+    float f = to_float(x);
     return (double)f < x ? nextafterf(f, INFINITY) : f;
 }
 
@@ -112,8 +112,8 @@ static knurl_range level_range(const shell_space *space, uint32_t triangle, int3
     if (k == 0 || (x1 - x0 + 2.0) * (y1 - y0 + 2.0) > (double)FEW_SAMPLES)
         return shell_height_range(space, &lod, KNURL_BOUNDS_RMIP, &f, x0, y0, x1, y1);
     knurl_range range = {INFINITY, -INFINITY};
-    for (int64_t j = (int64_t)floor(y0); j <= (int64_t)floor(y1); j++)
-        for (int64_t i = (int64_t)floor(x0); i <= (int64_t)floor(x1); i++) {
+    for (int64_t j = (int64_t)floor_d(y0); j <= (int64_t)floor_d(y1); j++)
+        for (int64_t i = (int64_t)floor_d(x0); i <= (int64_t)floor_d(x1); i++) {
             height_patch patch;
             height_patch_load(space, &lod, &f, i, j, 0, 0, &patch);
             range.min = min_d(range.min, patch.min);

@@ -210,7 +210,7 @@ static void add_interval(ray_curve *c, double a, double b)
     double ta = curve_depth(c, a), tb = curve_depth(c, b);
     bool forward = ta <= tb;
     c->intervals[c->interval_count++] =
-        forward ? (curve_interval){a, b, ta, tb, 0.0, 0.0} : (curve_interval){b, a, tb, ta, 0.0, 0.0};
+        forward ? (curve_interval){a, b, ta, tb} : (curve_interval){b, a, tb, ta};
 }
 
 /* The three side conditions at a point of the curve: barycentrics. */
@@ -228,44 +228,62 @@ static int nearest_side(const curve_point *at)
     return side;
 }
 
-/* Moves an end that lies on a side to where the curve's points (not only the quadratics) pass it by the
- * rounding of b, and sets its zone. `inwards` is a short step into the stretch. */
-static double settle_end(const ray_curve *c, double p, double inwards, double *zone)
+/* The side at parameter p, if there is one, and how its barycentric changes along the curve. `inwards`
+ * is a short step into the stretch. */
+typedef struct side_end {
+    int side; /* -1: an end of the height range */
+    double value, slope;
+} side_end;
+
+static side_end find_side(const ray_curve *c, double p, double inwards)
 {
     curve_point at = curve_at(c, p), inside = curve_at(c, p + inwards);
     int side = nearest_side(&at);
-    double e = c->barycentric_rounding, value = barycentric(&at, side);
-    double slope = (barycentric(&inside, side) - value) / inwards;
-    *zone = 0.0;
-    if (fabs(value) > 1e-5 || slope == 0.0) return p; /* an end of the height range */
-    if (c->refine)
-        for (int i = 0; i < 3; i++) {
-            double step = (barycentric(&at, side) + e) / slope;
-            if (!(fabs(step) <= fabs(inwards))) break;
-            p -= step;
-            at = curve_at(c, p);
-        }
-    *zone = min_d(2.0 * e / fabs(slope), fabs(inwards));
+    double value = barycentric(&at, side), slope = (barycentric(&inside, side) - value) / inwards;
+    return (side_end){fabs(value) > 1e-5 || slope == 0.0 ? -1 : side, value, slope};
+}
+
+static const double SHORT_STEP = 1e-3; /* of a stretch */
+
+double curve_end_zone(const ray_curve *c, const curve_interval *s, bool first)
+{
+    double inwards = SHORT_STEP * (first ? s->out - s->in : s->in - s->out);
+    if (inwards == 0.0) return 0.0;
+    side_end end = find_side(c, first ? s->in : s->out, inwards);
+    return end.side < 0
+               ? 0.0
+               : copysign(min_d(2.0 * c->barycentric_rounding / fabs(end.slope), fabs(inwards)), inwards);
+}
+
+/* Moves an end that lies on a side to where the curve's points (not only the quadratics) pass it by the
+ * rounding of b. */
+static double settle_end(const ray_curve *c, double p, double inwards)
+{
+    if (inwards == 0.0) return p;
+    side_end end = find_side(c, p, inwards);
+    for (int i = 0; end.side >= 0 && i < 3; i++) {
+        double step = (end.value + c->barycentric_rounding) / end.slope;
+        if (!(fabs(step) <= fabs(inwards))) break;
+        p -= step;
+        curve_point at = curve_at(c, p);
+        end.value = barycentric(&at, end.side);
+    }
     return p;
 }
 
-/* Settles both ends of every stretch, and drops stretches that the curve's points do not confirm: with
- * the quadratics alone the search was wider than rounding. */
+/* For refined points: settles both ends of every stretch, and drops stretches that the points do not
+ * confirm, since the search on the quadratics was wider than rounding. */
 static void settle_intervals(ray_curve *c)
 {
     int kept = 0;
     for (int i = 0; i < c->interval_count; i++) {
         curve_interval s = c->intervals[i];
-        double inwards = 1e-3 * (s.out - s.in);
-        if (inwards != 0.0) {
-            double in = settle_end(c, s.in, inwards, &s.zone_in),
-                   out = settle_end(c, s.out, -inwards, &s.zone_out);
-            s = (curve_interval){in, out, curve_depth(c, in), curve_depth(c, out), s.zone_in, s.zone_out};
-        }
+        double inwards = SHORT_STEP * (s.out - s.in);
+        double in = settle_end(c, s.in, inwards), out = settle_end(c, s.out, -inwards);
+        s = (curve_interval){in, out, curve_depth(c, in), curve_depth(c, out)};
         curve_point at = curve_at(c, 0.5 * (s.in + s.out));
         double least = min_d(barycentric(&at, 0), min_d(barycentric(&at, 1), barycentric(&at, 2)));
-        if (c->refine && (s.t_in > s.t_out || least < -2.0 * c->barycentric_rounding)) continue;
-        c->intervals[kept++] = s;
+        if (s.t_in <= s.t_out && least >= -2.0 * c->barycentric_rounding) c->intervals[kept++] = s;
     }
     c->interval_count = kept;
 }
@@ -346,12 +364,11 @@ static double texel_error(const triangle_frame *f, double e)
 /* After height_intervals: where a small W amplified rounding, points are inverted instead. */
 static void settle_height(ray_curve *c, const triangle_frame *f, const ray_view *v, bool steep)
 {
-    if (!steep && c->interval_count) {
-        curve_point near = curve_at(c, 0.5 * (c->intervals[0].in + c->intervals[0].out));
-        c->texel_remainder = texel_error(f, c->barycentric_rounding);
-        c->barycentric_rounding = inversion_rounding(f, v, v3(near.b1, near.b2, near.s));
-        c->refine = true;
-    }
+    if (steep || c->interval_count == 0) return;
+    curve_point near = curve_at(c, 0.5 * (c->intervals[0].in + c->intervals[0].out));
+    c->texel_remainder = texel_error(f, c->barycentric_rounding);
+    c->barycentric_rounding = inversion_rounding(f, v, v3(near.b1, near.b2, near.s));
+    c->refine = true;
     settle_intervals(c);
 }
 
@@ -383,7 +400,7 @@ static void depth_intervals(ray_curve *c, const triangle_frame *f, double reach)
     find_intervals(c, conditions, 5, -reach, reach);
     if (c->refine && !measure_remainder(c, &worst)) c->unreliable = true;
     c->texel_remainder = texel_error(f, 4.0 * worst);
-    if (!c->unreliable) settle_intervals(c);
+    if (c->refine && !c->unreliable) settle_intervals(c);
 }
 
 /* Farthest depth, from the ray's point nearest to the centre, that the shell can reach. */

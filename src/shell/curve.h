@@ -24,11 +24,10 @@ enum { CURVE_MAX_INTERVALS = 8 };
 
 /* A stretch of the curve inside the prism. in -> out follows the ray (t grows); in may be the
  * larger parameter. An end at a side of the prism lies past the side by the rounding of the side's
- * place; `zone` is how far inwards, as a parameter step, the side may truly be. 0 at other ends. */
+ * place. */
 typedef struct curve_interval {
     double in, out;
     double t_in, t_out;
-    double zone_in, zone_out;
 } curve_interval;
 
 typedef struct ray_curve {
@@ -56,6 +55,10 @@ typedef struct curve_point {
 
 /* Finds the curve and its stretches inside the prism. The curve refers to the frame. */
 void ray_curve_make(const triangle_frame *frame, const knurl_ray *ray, ray_curve *curve);
+
+/* How far from one of its ends, as a signed parameter step inwards, the side that ends a stretch may
+ * truly be; 0 if that end is not at a side. */
+double curve_end_zone(const ray_curve *curve, const curve_interval *stretch, bool first);
 
 curve_point curve_at_refined(const ray_curve *curve, double p);
 

@@ -31,8 +31,8 @@ static void load_texels(const shell_space *space, const uint32_t *v, const heigh
         const float *st = space->mesh.texcoords + 2 * (size_t)v[i];
         uv[i] = shell_uv(space, (double)st[0], (double)st[1]);
     }
-    f->origin_x = (int64_t)floor((uv[0].x + uv[1].x + uv[2].x) / 3.0 * w - 0.5);
-    f->origin_y = (int64_t)floor((uv[0].y + uv[1].y + uv[2].y) / 3.0 * h - 0.5);
+    f->origin_x = (int64_t)floor_d((uv[0].x + uv[1].x + uv[2].x) / 3.0 * w - 0.5);
+    f->origin_y = (int64_t)floor_d((uv[0].y + uv[1].y + uv[2].y) / 3.0 * h - 0.5);
     f->texel_rounding = 0.0;
     for (int i = 0; i < 3; i++) {
         f->x[i] = (uv[i].x * w - 0.5) - (double)f->origin_x;

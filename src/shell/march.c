@@ -156,11 +156,11 @@ static double start_family(line_family *l, const ray_curve *curve, const quadrat
                            double offset, double first, double last, double in, double out)
 {
     *l = (line_family){.coordinate = coordinate, .offset = offset, .scale = scale, .last = last};
-    double position = first * scale + offset, cell = floor(position);
+    double position = first * scale + offset, cell = floor_d(position);
     l->step = last > first ? 1.0 : last < first ? -1.0 : 0.0;
     l->line = cell + 1.0;
     if (l->step < 0.0) {
-        cell = ceil(position) - 1.0;
+        cell = ceil_d(position) - 1.0;
         l->line = cell;
     }
     next_crossing(l, curve, in, out);
@@ -239,10 +239,9 @@ static double g_rounding(const shell_walk *walk, const height_patch *patch)
 static double end_tolerance(const march_state *m, const cell_function *f, sample end, bool first)
 {
     const curve_interval *s = m->walk->stretch;
-    double zone = first && end.p == s->in ? s->zone_in : !first && end.p == s->out ? s->zone_out : 0.0;
-    if (zone == 0.0) return f->rounding;
-    double inwards = (m->out >= m->in) == first ? zone : -zone;
-    return f->rounding + fabs(g_at(f, end.p + inwards) - end.g);
+    if (end.p != (first ? s->in : s->out)) return f->rounding;
+    double zone = curve_end_zone(m->walk->curve, s, first);
+    return zone == 0.0 ? f->rounding : f->rounding + fabs(g_at(f, end.p + zone) - end.g);
 }
 
 /* One texel from parameter a to b. */

@@ -285,10 +285,10 @@ static extent coarse_cells(const search *s, const extent *e, double i, double j)
     const height_lod *lod = s->lod;
     double ox = (double)s->f->origin_x + 0.5, oy = (double)s->f->origin_y + 0.5;
     if (!(lod->blend > 0.0)) return (extent){0.0, 0.0, 0.0, 0.0};
-    return (extent){floor((max_d(e->x0, i) + ox) * lod->ratio[0] - 0.5),
-                    floor((max_d(e->y0, j) + oy) * lod->ratio[1] - 0.5),
-                    floor((min_d(e->x1, i + 1.0) + ox) * lod->ratio[0] - 0.5),
-                    floor((min_d(e->y1, j + 1.0) + oy) * lod->ratio[1] - 0.5)};
+    return (extent){floor_d((max_d(e->x0, i) + ox) * lod->ratio[0] - 0.5),
+                    floor_d((max_d(e->y0, j) + oy) * lod->ratio[1] - 0.5),
+                    floor_d((min_d(e->x1, i + 1.0) + ox) * lod->ratio[0] - 0.5),
+                    floor_d((min_d(e->y1, j + 1.0) + oy) * lod->ratio[1] - 0.5)};
 }
 
 /* All patches a small piece touches, each extended over the whole piece. Returns false if the piece
@@ -296,8 +296,8 @@ static extent coarse_cells(const search *s, const extent *e, double i, double j)
 static bool try_piece(search *s, const piece *p, const extent *e)
 {
     bool done = true;
-    for (double j = floor(e->y0); j <= floor(e->y1); j++)
-        for (double i = floor(e->x0); i <= floor(e->x1); i++) {
+    for (double j = floor_d(e->y0); j <= floor_d(e->y1); j++)
+        for (double i = floor_d(e->x0); i <= floor_d(e->x1); i++) {
             extent coarse = coarse_cells(s, e, i, j);
             for (double v = coarse.y0; v <= coarse.y1; v++)
                 for (double u = coarse.x0; u <= coarse.x1; u++) {
@@ -360,7 +360,7 @@ bool shell_subdivide(const shell_space *space, const height_lod *lod, knurl_boun
         (*steps)++;
         piece_box(&s, &p, h, &lower, &upper);
         if (!ray_meets_box(&s, lower, upper)) continue;
-        bool small = floor(e.x1) - floor(e.x0) <= 1.0 && floor(e.y1) - floor(e.y0) <= 1.0;
+        bool small = floor_d(e.x1) - floor_d(e.x0) <= 1.0 && floor_d(e.y1) - floor_d(e.y0) <= 1.0;
         if ((small || p.depth == SUBDIVIDE_DEPTH) && try_piece(&s, &p, &e)) continue;
         if (p.depth < SUBDIVIDE_DEPTH) push_children(stack, &top, &p);
     }
