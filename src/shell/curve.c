@@ -151,17 +151,17 @@ static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_
     return true;
 }
 
-/* Bound on the error of b by rounding, for points that are inverted at a known t: the rounding of the
- * ray's point and of the shell's, through the inverse of J at `near`. */
-static double inversion_rounding(const triangle_frame *f, const ray_view *v, vec3 near)
+/* Bounds on the errors of b and s by rounding, for points that are inverted at a known t: the rounding
+ * of the ray's point and of the shell's, through the inverse of J at `near`. */
+static void set_inversion_rounding(const triangle_frame *f, const ray_view *v, vec3 near, ray_curve *c)
 {
     vec3 ja, jb, js;
     shell_columns(f, near, &ja, &jb, &js);
-    double amplification =
-        v3_length(v3_cross(ja, jb)) + v3_length(v3_cross(jb, js)) + v3_length(v3_cross(ja, js));
     double reach = f->size + max_d(fabs(f->s0), fabs(f->s1));
-    return (v->p_rounding + 16.0 * DBL_EPSILON * reach) * amplification / fabs(v3_det(ja, jb, js)) +
-           16.0 * DBL_EPSILON;
+    double error = (v->p_rounding + 16.0 * DBL_EPSILON * reach) / fabs(v3_det(ja, jb, js));
+    double across = v3_length(v3_cross(jb, js)) + v3_length(v3_cross(ja, js));
+    c->barycentric_rounding = error * across + 16.0 * DBL_EPSILON;
+    c->height_rounding = error * v3_length(v3_cross(ja, jb));
 }
 
 curve_point curve_at_refined(const ray_curve *c, double p)
@@ -367,7 +367,7 @@ static void settle_height(ray_curve *c, const triangle_frame *f, const ray_view 
     if (steep || c->interval_count == 0) return;
     curve_point near = curve_at(c, 0.5 * (c->intervals[0].in + c->intervals[0].out));
     c->texel_remainder = texel_error(f, c->barycentric_rounding);
-    c->barycentric_rounding = inversion_rounding(f, v, v3(near.b1, near.b2, near.s));
+    set_inversion_rounding(f, v, v3(near.b1, near.b2, near.s), c);
     c->refine = true;
     settle_intervals(c);
 }
@@ -395,7 +395,7 @@ static void depth_intervals(ray_curve *c, const triangle_frame *f, double reach)
     above.c[0] -= f->s0;
     for (int k = 0; k < 3; k++) below.c[k] = -below.c[k];
     below.c[0] += f->s1;
-    double height_error = e * (f->size + fabs(f->s0) + fabs(f->s1));
+    double height_error = e * (f->size + fabs(f->s0) + fabs(f->s1)) + c->height_rounding;
     condition conditions[5] = {{b0, e}, {c->b1, e}, {c->b2, e}, {above, height_error}, {below, height_error}};
     find_intervals(c, conditions, 5, -reach, reach);
     if (c->refine && !measure_remainder(c, &worst)) c->unreliable = true;
@@ -436,7 +436,7 @@ static double center_depth(const ray_view *v)
 static void follow_by_depth(const triangle_frame *f, const ray_view *v, ray_curve *c)
 {
     c->interval_count = 0;
-    c->barycentric_rounding = inversion_rounding(f, v, v3(c->b1.c[0], c->b2.c[0], c->s.c[0]));
+    set_inversion_rounding(f, v, v3(c->b1.c[0], c->b2.c[0], c->s.c[0]), c);
     depth_intervals(c, f, depth_reach(f));
 }
 
@@ -504,7 +504,7 @@ void ray_curve_make(const triangle_frame *f, const knurl_ray *ray, ray_curve *c)
     view_make(f, ray, &v);
     c->interval_count = 0;
     c->by_depth = c->refine = c->unreliable = false;
-    c->texel_remainder = 0.0;
+    c->texel_remainder = c->height_rounding = 0.0;
     c->frame = f;
     c->origin = v3_sub(v3_load(ray->origin), f->base);
     c->direction = v3_load(ray->direction);

@@ -42,6 +42,7 @@ typedef struct ray_curve {
     double depth_origin;           /* by_depth: t = depth_origin + parameter * depth_scale */
     double depth_scale;
     double barycentric_rounding;                   /* bound on the error of b along the intervals */
+    double height_rounding;                        /* the same for s */
     double texel_rounding;                         /* bound on the error of x and y at a parameter */
     double texel_remainder;                        /* how far the quadratics x and y may be from that */
     curve_interval intervals[CURVE_MAX_INTERVALS]; /* front to back */

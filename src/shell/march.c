@@ -230,18 +230,20 @@ static double g_rounding(const shell_walk *walk, const height_patch *patch)
                                      : walk->curve->barycentric_rounding * s *
                                            (fabs(f->ne.x) + fabs(f->ne.y) + fabs(f->ne.z) + fabs(f->nf.x) +
                                             fabs(f->nf.y) + fabs(f->nf.z));
-    return patch->slope * walk->curve->texel_rounding + normals +
+    return patch->slope * walk->curve->texel_rounding + normals + walk->curve->height_rounding +
            32.0 * DBL_EPSILON * (s + max_d(fabs(patch->min), fabs(patch->max)));
 }
 
-/* Bound on what g may be where the next stretch or triangle takes over, if it is zero there. `inwards`
- * is the sign of the way into the march. */
-static double end_tolerance(const march_state *m, const cell_function *f, sample end, bool first)
+/* Whether the surface touches the ray at an end of the march within rounding, where what comes next may
+ * see the other sign. At a side of the prism this may be anywhere in the zone that the side lies in. If g
+ * keeps its sign there it is nearest to zero at one of the zone's ends. */
+static bool touches_end(march_state *m, const cell_function *f, sample end, bool first)
 {
+    if (fabs(end.g) <= f->rounding) return accept(m->walk, f, end.p);
     const curve_interval *s = m->walk->stretch;
-    if (end.p != (first ? s->in : s->out)) return f->rounding;
+    if (end.p != (first ? s->in : s->out)) return false;
     double zone = curve_end_zone(m->walk->curve, s, first);
-    return zone == 0.0 ? f->rounding : f->rounding + fabs(g_at(f, end.p + zone) - end.g);
+    return zone != 0.0 && fabs(g_at(f, end.p + zone)) <= f->rounding && accept(m->walk, f, end.p + zone);
 }
 
 /* One texel from parameter a to b. */
@@ -259,11 +261,10 @@ static bool visit(march_state *m, double a, double b)
     }
     sample start = {a, m->have_carried ? m->carried : g_at(&f, a)};
     sample end = {b, g_at(&f, b)};
-    if (a == m->in && fabs(start.g) <= end_tolerance(m, &f, start, true) && accept(m->walk, &f, a))
-        return true;
+    if (a == m->in && touches_end(m, &f, start, true)) return true;
     if (a != b && leaf(m->walk, &f, start, end)) return true;
     if (a == b && (start.g <= 0.0) != (end.g <= 0.0) && accept(m->walk, &f, a)) return true;
-    if (b == m->out && fabs(end.g) <= end_tolerance(m, &f, end, false) && accept(m->walk, &f, b)) return true;
+    if (b == m->out && touches_end(m, &f, end, false)) return true;
     m->carried = end.g;
     m->have_carried = true;
     return false;

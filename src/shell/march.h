@@ -18,9 +18,8 @@ typedef struct shell_walk {
 
 /* Finds the first root of g = s |N| - h along the curve from parameter `in` to `out`, a stretch
  * where x and y are monotone, with t in the ray's [tmin, tmax]. Visits the texels that the curve
- * crosses in order. Both ends are closed: a g that is zero within rounding there is a hit, because what
- * comes next may see the other sign. At a side of the prism that rounding includes how much g changes
- * over the zone in which the side lies. */
+ * crosses in order. Both ends are closed: where g is zero within rounding there, at a side of the prism
+ * within the zone that the side lies in, that is a hit, because what comes next may see the other sign. */
 bool shell_march(shell_walk *walk, double in, double out);
 
 #endif
