@@ -1,0 +1,11 @@
+/* commands.h: one function per command; each gets its own arguments, argv[0] being "knurl COMMAND", and
+ * returns the program's exit status. */
+#ifndef APP_COMMANDS_H
+#define APP_COMMANDS_H
+
+int render_command(int argc, char **argv);
+int trace_command(int argc, char **argv);
+int info_command(int argc, char **argv);
+int compare_command(int argc, char **argv);
+
+#endif
