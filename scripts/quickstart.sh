@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# From a fresh checkout to a picture: installs what is missing, builds, writes the demo gallery, renders it.
+. "$(dirname "$0")/common.sh"
+echo "1/4 packages"
+scripts/setup.sh
+echo "2/4 building in build/ (a minute or two the first time)"
+build_tree build -DCMAKE_BUILD_TYPE=Release -DKNURL_TESTS=OFF
+echo "3/4 writing the demo scene to out/gallery"
+scene=out/gallery/gallery.gltf
+build/bin/knurl demo gallery out
+echo "4/4 rendering $scene"
+build/bin/knurl render "$scene" -o out/knurl.png --width 960 --height 540 --spp "${KNURL_SPP:-16}"
+echo
+echo "The picture is $root/out/knurl.png"
+echo "What is in the scene, and what it costs: build/bin/knurl info $scene"
