@@ -119,9 +119,6 @@ static knurl_status build_scene(command_session *session, const method_options *
 {
     knurl_build_def def = knurl_build_def_default();
     if (method->method) def.surface.method = method->method;
-    if (!isnan(method->marching_scale)) def.surface.marching_scale = method->marching_scale;
-    if (method->no_inversion) def.surface.inversion = false;
-    if (method->bounds >= 0) def.surface.bounds = (knurl_bounds_kind)method->bounds;
     def.heightmap = heightmap_def_from(method);
     def.progress = progress_update;
     def.progress_user = &session->progress;

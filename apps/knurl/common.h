@@ -17,11 +17,8 @@ typedef struct general_options {
 
 /* How the surface is traced. Parse with method_argp. */
 typedef struct method_options {
-    const char *method;    /* NULL: the library's default */
-    double marching_scale; /* NaN: the library's default */
-    bool no_inversion;
-    int bounds;    /* knurl_bounds_kind, -1: the library's default */
-    int rmip_cell; /* 0: the library's default */
+    const char *method; /* with its parameters; NULL: the library's default */
+    int rmip_cell;      /* 0: the library's default */
 } method_options;
 
 /* Displacement given on the command line. Parse with displacement_argp. */

@@ -117,7 +117,7 @@ static knurl_status measure_use(command_session *session, knurl_heightmap *map, 
     static const float texcoords[8] = {0, 0, 1, 0, 1, 1, 0, 1};
     static const uint32_t triangles[6] = {0, 2, 1, 0, 3, 2};
     knurl_surface_def def = knurl_surface_def_default();
-    def.mesh = (knurl_mesh_view){positions, normals, texcoords, 4, triangles, 2};
+    def.mesh = (knurl_mesh_view){positions, normals, texcoords, 4, triangles, 2, NULL};
     def.displacement = knurl_displacement_default();
     def.displacement.map = map;
     if (!isnan(options->displacement.tile_u)) {

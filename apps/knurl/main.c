@@ -10,6 +10,22 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* "    name:parameter=preset   summary (range)" */
+static void print_parameter(const char *method, const knurl_method_parameter *p)
+{
+    char assignment[96];
+    if (!p->choices) {
+        (void)snprintf(assignment, sizeof assignment, "%s:%s=%g", method, p->name, p->preset);
+        printf("    %-34s %s; %g to %g\n", assignment, p->summary, p->least, p->most);
+        return;
+    }
+    const char *choice = p->choices;
+    for (int i = 0; i < (int)p->preset; i++) choice += strcspn(choice, "|") + 1;
+    (void)snprintf(assignment, sizeof assignment, "%s:%s=%.*s", method, p->name, (int)strcspn(choice, "|"),
+                   choice);
+    printf("    %-34s %s; %s\n", assignment, p->summary, p->choices);
+}
+
 static int methods_command(int argc, char **argv);
 static int help_command(int argc, char **argv);
 
@@ -101,7 +117,9 @@ static int methods_command(int argc, char **argv)
         NULL,
         NULL,
         "List the ways to intersect a displaced surface; * marks the default.\v"
-        "Name one with --method in `knurl render', `knurl trace' and `knurl info'.",
+        "Name one with --method in `knurl render', `knurl trace' and `knurl info', with parameters after "
+        "colons if the default values, shown here, do not suit: --method "
+        "rmip:marching-scale=4:bounds=minmax.",
         NULL,
         NULL,
         NULL};
@@ -110,6 +128,11 @@ static int methods_command(int argc, char **argv)
     for (int32_t i = 0; i < knurl_method_count(); i++)
         printf("%c %-14s %s\n", strcmp(knurl_method_name(i), standard) == 0 ? '*' : ' ', knurl_method_name(i),
                knurl_method_summary(i));
+    for (int32_t i = 0; i < knurl_method_count(); i++) {
+        const knurl_method_parameter *p;
+        for (int32_t k = 0; (p = knurl_method_get_parameter(i, k)); k++)
+            print_parameter(knurl_method_name(i), p);
+    }
     return CODE_DONE;
 }
 

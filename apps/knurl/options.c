@@ -10,9 +10,6 @@ enum {
     KEY_THREADS = 0x100,
     KEY_MEMORY_LIMIT,
     KEY_METHOD,
-    KEY_MARCHING_SCALE,
-    KEY_NO_INVERSION,
-    KEY_BOUNDS,
     KEY_RMIP_CELL,
     KEY_DISP,
     KEY_DISP_FACTOR,
@@ -73,38 +70,29 @@ const struct argp general_argp = {general_list, parse_general, NULL, NULL, NULL,
 
 method_options method_options_default(void)
 {
-    return (method_options){.marching_scale = NAN, .bounds = -1};
+    return (method_options){0};
 }
 
-static void check_method(struct argp_state *state, const char *name)
+static void check_method(struct argp_state *state, const char *specification)
 {
+    knurl_error error = {0};
+    if (knurl_method_check(specification, NULL, &error) == KNURL_OK) return;
     char list[512] = "";
     size_t used = 0;
     for (int32_t i = 0; i < knurl_method_count(); i++) {
-        if (strcmp(name, knurl_method_name(i)) == 0) return;
         int more = snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", knurl_method_name(i));
         if (more > 0 && used + (size_t)more < sizeof list) used += (size_t)more;
     }
-    argp_error(state, "--method: found '%s', expected one of %s", name, list);
+    argp_error(state, "--method: %s; methods are %s", error.message, list);
 }
 
 static error_t parse_method(int key, char *argument, struct argp_state *state)
 {
-    static const char *const bounds_names[] = {"minmax", "rmip", NULL};
     method_options *options = state->input;
     switch (key) {
     case KEY_METHOD:
         check_method(state, argument);
         options->method = argument;
-        break;
-    case KEY_MARCHING_SCALE:
-        options->marching_scale = value_real(state, "--marching-scale", argument, 1, 4096);
-        break;
-    case KEY_NO_INVERSION:
-        options->no_inversion = true;
-        break;
-    case KEY_BOUNDS:
-        options->bounds = value_choice(state, "--bounds", argument, bounds_names);
         break;
     case KEY_RMIP_CELL: {
         options->rmip_cell = (int)value_integer(state, "--rmip-cell", argument, 1, 32);
@@ -119,12 +107,9 @@ static error_t parse_method(int key, char *argument, struct argp_state *state)
 }
 
 static const struct argp_option method_list[] = {
-    {"method", KEY_METHOD, "NAME", 0, "How rays meet the surface; `knurl methods' lists them", 0},
-    {"marching-scale", KEY_MARCHING_SCALE, "TEXELS", 0,
-     "March through texels once bounds are this small (default 6)", 0},
-    {"no-inversion", KEY_NO_INVERSION, NULL, 0,
-     "Do not tighten bounds by inverting their entry and exit points", 0},
-    {"bounds", KEY_BOUNDS, "KIND", 0, "Range structure: rmip (default) or minmax", 0},
+    {"method", KEY_METHOD, "NAME[:PARAMETER=VALUE...]", 0,
+     "How rays meet the surface, e.g. rmip:marching-scale=4; `knurl methods' lists methods and parameters",
+     0},
     {"rmip-cell", KEY_RMIP_CELL, "N", 0,
      "Texels per side of a cell of the RMIP table: 1 to 32, a power of two (default 8). Larger is smaller "
      "and slower",

@@ -25,6 +25,10 @@ typedef struct knurl_mesh_view {
     uint32_t vertex_count;
     const uint32_t *triangles; /* 3 per triangle, each under vertex_count */
     uint32_t triangle_count;
+    const float *directions;   /* NULL, or 3 per vertex: N of any finite, non-zero length in place of
+                                  the unit normals; the surface is then S = P + h N whatever
+                                  knurl_displacement.unnormalised says. With N pointing to one point,
+                                  shells are frusta (reverse perspective, Baboud and Decoret 2006) */
 } knurl_mesh_view;
 
 /* How a map displaces a mesh. Fill with knurl_displacement_default(). The uv transform is that of
@@ -85,11 +89,8 @@ typedef struct knurl_surface_def {
     uint32_t cookie;
     knurl_mesh_view mesh;
     knurl_displacement displacement;
-    const char *method;   /* name of an intersection method, default "rmip" */
-    /* Method parameters; those a method does not have are ignored. */
-    double marching_scale;  /* texels; bounds at most this long are marched (RMIP 4.4); default 6 */
-    bool inversion;         /* tighten by inverting box entry and exit (RMIP 4.3); default true */
-    knurl_bounds_kind bounds; /* default KNURL_BOUNDS_RMIP */
+    const char *method;   /* an intersection method, with parameters if wanted, each after a colon:
+                             "rmip" (default), "rmip:marching-scale=4:bounds=minmax" */
 } knurl_surface_def;
 
 KNURL_API knurl_surface_def knurl_surface_def_default(void);
@@ -136,6 +137,27 @@ KNURL_API void knurl_surface_get_info(const knurl_surface *surface, knurl_surfac
 KNURL_API int32_t knurl_method_count(void);
 KNURL_API const char *knurl_method_name(int32_t index);    /* NULL out of range */
 KNURL_API const char *knurl_method_summary(int32_t index); /* one line, with its paper */
+
+enum {
+    KNURL_METHOD_EXACT = 1u << 0,        /* finds the first hit of the exact surface */
+    KNURL_METHOD_UNNORMALISED = 1u << 1, /* defined for S = P + h N, and makes its surface so */
+    KNURL_METHOD_NATIVE = 1u << 2        /* traced by Embree itself; no level of detail, no shells */
+};
+KNURL_API uint32_t knurl_method_flags(int32_t index); /* KNURL_METHOD_*; 0 out of range */
+
+/* A number, or one of several names. */
+typedef struct knurl_method_parameter {
+    const char *name, *summary;
+    double preset, least, most; /* default value and closed range */
+    const char *choices;        /* NULL for numbers; else names with | between, valued 0, 1, ... */
+} knurl_method_parameter;
+
+/* Parameter number `parameter` of a method; NULL past the last. */
+KNURL_API const knurl_method_parameter *knurl_method_get_parameter(int32_t index, int32_t parameter);
+/* Whether `specification` names a method and parameters that it has, with values in range. *index
+ * (may be NULL) is the method. */
+KNURL_API knurl_status knurl_method_check(const char *specification, int32_t *index,
+                                          knurl_error *error);
 
 #ifdef __cplusplus
 }

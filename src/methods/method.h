@@ -6,11 +6,7 @@
 
 #include "shell/shell.h"
 
-enum {
-    METHOD_EXACT = 1u << 0, /* finds the first root of the exact surface */
-    METHOD_LOD = 1u << 1,   /* fractional level of detail */
-    METHOD_FOLDED = 1u << 2 /* handles folded shells */
-};
+enum { METHOD_MAX_PARAMETERS = 16 };
 
 /* A query against one shell. The level of detail is resolved, the triangle is loaded. */
 typedef struct method_query {
@@ -25,19 +21,23 @@ typedef struct method_query {
 
 typedef struct method {
     const char *name;
-    const char *summary;   /* one line, with its paper */
-    uint32_t capabilities; /* METHOD_* */
+    const char *summary; /* one line, with its paper */
+    uint32_t flags;      /* KNURL_METHOD_* */
+    /* Ends with a parameter without a name. Values arrive checked, in the same order. */
+    const knurl_method_parameter *parameters;
     /* Makes the method's own data for a surface (NULL if it has none). Immutable afterwards. */
-    knurl_status (*build)(const shell_space *space, const knurl_surface_def *def, void **data,
-                          knurl_error *error);
+    knurl_status (*build)(const shell_space *space, const double *values, void **data, knurl_error *error);
     /* First root of the shell along the ray in [tmin, tmax]. Thread-safe, never allocates. */
     bool (*intersect)(const void *data, const method_query *query);
     uint64_t (*bytes)(const void *data);
     void (*destroy)(const shell_space *space, void *data);
 } method;
 
-/* NULL if there is none of that name. */
-const method *method_find(const char *name);
+/* The method of that name; NULL if there is none. */
+const method *method_find(const char *name, size_t length);
+/* Method and parameter values of a specification such as "rmip:bounds=minmax". */
+knurl_status method_parse(const char *specification, const method **found,
+                          double values[METHOD_MAX_PARAMETERS], knurl_error *error);
 
 /* The surface's map, for telling shared ones apart. Not retained. */
 const knurl_heightmap *knurl_surface_map(const knurl_surface *surface);

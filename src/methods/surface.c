@@ -18,12 +18,8 @@ knurl_displacement knurl_displacement_default(void)
 
 knurl_surface_def knurl_surface_def_default(void)
 {
-    return (knurl_surface_def){.cookie = KNURL_COOKIE,
-                               .displacement = knurl_displacement_default(),
-                               .method = "rmip",
-                               .marching_scale = 6.0,
-                               .inversion = true,
-                               .bounds = KNURL_BOUNDS_RMIP};
+    return (knurl_surface_def){
+        .cookie = KNURL_COOKIE, .displacement = knurl_displacement_default(), .method = "rmip"};
 }
 
 knurl_ray knurl_ray_make(const double origin[3], const double direction[3])
@@ -129,8 +125,8 @@ static void fill_info(knurl_surface *surface, uint64_t replaced)
     info->tessellated_bytes = (uint64_t)(170.0 * texels);
 }
 
-static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *def, uint64_t *replaced,
-                               knurl_error *error)
+static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *def, const double *values,
+                               uint64_t *replaced, knurl_error *error)
 {
     shell_space *space = &surface->space;
     const knurl_displacement *d = &def->displacement;
@@ -140,14 +136,15 @@ static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *
     space->offset = d->offset;
     space->wrap_u = d->wrap_u;
     space->wrap_v = d->wrap_v;
-    space->unnormalised = d->unnormalised;
+    space->unnormalised =
+        d->unnormalised || def->mesh.directions || (surface->method->flags & KNURL_METHOD_UNNORMALISED);
     set_uv_transform(d, space->uv);
     if (d->map)
         space->map = knurl_heightmap_retain(d->map);
     else
         status = make_flat_map(space->context, &space->map, error);
     if (status == KNURL_OK) status = shell_space_build(space, error);
-    if (status == KNURL_OK) status = surface->method->build(space, def, &surface->data, error);
+    if (status == KNURL_OK) status = surface->method->build(space, values, &surface->data, error);
     return status;
 }
 
@@ -159,9 +156,10 @@ knurl_status knurl_surface_create(knurl_context *context, const knurl_surface_de
     if (!context || !def || def->cookie != KNURL_COOKIE || def->displacement.cookie != KNURL_COOKIE)
         return knurl_fail(error, KNURL_ERROR_ARGUMENT,
                           "surface definition was not made by knurl_surface_def_default()");
-    const method *found = method_find(def->method ? def->method : "rmip");
-    if (!found) return knurl_fail(error, KNURL_ERROR_ARGUMENT, "method '%s' is not known", def->method);
-    knurl_status status = check_displacement(&def->displacement, error);
+    const method *found = NULL;
+    double values[METHOD_MAX_PARAMETERS];
+    knurl_status status = method_parse(def->method ? def->method : "rmip", &found, values, error);
+    if (status == KNURL_OK) status = check_displacement(&def->displacement, error);
     if (status != KNURL_OK) return status;
     knurl_surface *made = knurl_alloc_zero(context, sizeof *made);
     if (!made) return knurl_fail_memory(error, sizeof *made, "a surface");
@@ -169,7 +167,7 @@ knurl_status knurl_surface_create(knurl_context *context, const knurl_surface_de
     made->method = found;
     atomic_init(&made->references, 1);
     uint64_t replaced = 0;
-    status = make_space(made, def, &replaced, error);
+    status = make_space(made, def, values, &replaced, error);
     if (status != KNURL_OK) {
         knurl_surface_release(made);
         return status;

@@ -127,6 +127,21 @@ static knurl_status make_normals(knurl_context *context, const float *given, bas
     return good ? KNURL_OK : knurl_fail_memory(error, count * 28, "smooth normals");
 }
 
+static knurl_status copy_directions(const knurl_mesh_view *view, base_mesh *mesh, uint64_t *replaced,
+                                    knurl_error *error)
+{
+    *replaced = 0;
+    knurl_status status = check_finite(view->directions, view->vertex_count, 3, "direction", error);
+    for (size_t v = 0; status == KNURL_OK && v < view->vertex_count; v++) {
+        const float *d = view->directions + 3 * v;
+        if (d[0] == 0.0f && d[1] == 0.0f && d[2] == 0.0f)
+            status = knurl_fail(error, KNURL_ERROR_INPUT, "vertex %zu: direction is 0, expected a length", v);
+    }
+    if (status == KNURL_OK && view->vertex_count)
+        memcpy(mesh->normals, view->directions, (size_t)view->vertex_count * 3 * sizeof(float));
+    return status;
+}
+
 knurl_status base_mesh_copy(knurl_context *context, const knurl_mesh_view *view, base_mesh *mesh,
                             uint64_t *replaced_normals, knurl_error *error)
 {
@@ -152,7 +167,8 @@ knurl_status base_mesh_copy(knurl_context *context, const knurl_mesh_view *view,
         memcpy(mesh->texcoords, view->texcoords, vertices * 2 * sizeof(float));
     else
         memset(mesh->texcoords, 0, vertices * 2 * sizeof(float));
-    status = make_normals(context, view->normals, mesh, replaced_normals, error);
+    status = view->directions ? copy_directions(view, mesh, replaced_normals, error)
+                              : make_normals(context, view->normals, mesh, replaced_normals, error);
     if (status != KNURL_OK) base_mesh_free(context, mesh);
     return status;
 }

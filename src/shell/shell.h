@@ -12,7 +12,7 @@
 
 /* Vertex data, shared by every method. Triangles index vertices. */
 typedef struct base_mesh {
-    float *positions, *normals, *texcoords; /* 3, 3 (unit), 2 per vertex */
+    float *positions, *normals, *texcoords; /* 3, 3 (unit, or given directions), 2 per vertex */
     uint32_t *triangles;
     uint32_t vertex_count, triangle_count;
 } base_mesh;

@@ -47,7 +47,7 @@ expect_error 2 "--height: found '99999999999999999999', expected" "$knurl" rende
 expect_error 2 "--spp: found 'many', expected" "$knurl" render plane.obj -o a.png --spp many
 expect_error 2 "--seed: found '-1', expected" "$knurl" render plane.obj -o a.png --seed -1
 expect_error 2 "--integrator: found 'light', expected one of path, ao, primary" "$knurl" render plane.obj -o a.png --integrator light
-expect_error 2 "--method: found 'magic', expected one of rmip" "$knurl" render plane.obj -o a.png --method magic
+expect_error 2 "--method: method 'magic' is not known; methods are rmip" "$knurl" render plane.obj -o a.png --method magic
 expect_error 2 "--background: found '1,2', expected three numbers" "$knurl" render plane.obj -o a.png --background 1,2
 expect_error 2 "--background: found '1,2,nan', expected three numbers" "$knurl" render plane.obj -o a.png --background 1,2,nan
 expect_error 2 "--crop: found '0,0,10', expected four whole numbers" "$knurl" render plane.obj -o a.png --crop 0,0,10
@@ -59,7 +59,9 @@ expect_error 2 "--tile: found '4', expected two numbers such as 4x4" "$knurl" re
 expect_error 2 "--tile: found '4x0', expected numbers other than zero" "$knurl" render plane.obj -o a.png --tile 4x0
 expect_error 2 "--wrap: found 'wave', expected one of repeat, mirror, clamp" "$knurl" render plane.obj -o a.png --wrap wave
 expect_error 2 "--rmip-cell: found '12', expected 1, 2, 4, 8, 16 or 32" "$knurl" render plane.obj -o a.png --rmip-cell 12
-expect_error 2 "--bounds: found 'boxes', expected one of minmax, rmip" "$knurl" render plane.obj -o a.png --bounds boxes
+expect_error 2 "method parameter bounds: found 'boxes', expected one of minmax|rmip" "$knurl" render plane.obj -o a.png --method rmip:bounds=boxes
+expect_error 2 "method rmip: found 'speed=9', expected PARAMETER=VALUE" "$knurl" render plane.obj -o a.png --method rmip:speed=9
+expect_error 2 "marching-scale: found '0', expected a number from 1 to 4096" "$knurl" render plane.obj -o a.png --method rmip:marching-scale=0
 expect_error 2 "--memory-limit: found '2X', expected bytes such as 500M" "$knurl" render plane.obj -o a.png --memory-limit 2X
 expect_error 2 "--threads: found '4096', expected" "$knurl" render plane.obj -o a.png --threads 4096
 expect_error 2 "unrecognized option '--wdth=3'" "$knurl" render plane.obj -o a.png --wdth=3

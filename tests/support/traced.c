@@ -27,12 +27,13 @@ static knurl_status make_map(traced *t, const oracle_def *def, knurl_heightmap *
     return status;
 }
 
-static knurl_status make_surface(traced *t, const oracle_def *def, const traced_options *options,
-                                 knurl_heightmap *map, knurl_error *error)
+static knurl_status make_surface(traced *t, const oracle_def *def, const char *method, knurl_heightmap *map,
+                                 knurl_error *error)
 {
     knurl_surface_def surface = knurl_surface_def_default();
-    surface.mesh = (knurl_mesh_view){def->positions,    def->normals,   def->texcoords,
-                                     def->vertex_count, def->triangles, def->triangle_count};
+    surface.mesh = (knurl_mesh_view){
+        def->positions,      def->normals, def->texcoords, def->vertex_count, def->triangles,
+        def->triangle_count, NULL};
     knurl_displacement *d = &surface.displacement;
     *d = knurl_displacement_default();
     d->map = map;
@@ -44,10 +45,7 @@ static knurl_status make_surface(traced *t, const oracle_def *def, const traced_
     memcpy(d->uv_scale, def->uv_scale, sizeof d->uv_scale);
     d->uv_rotation = def->uv_rotation;
     d->unnormalised = def->unnormalised;
-    surface.method = options->method;
-    surface.inversion = options->inversion;
-    surface.bounds = options->bounds;
-    if (options->marching_scale > 0.0) surface.marching_scale = options->marching_scale;
+    surface.method = method;
     return knurl_surface_create(t->context, &surface, &t->surface, error);
 }
 
@@ -62,7 +60,7 @@ static knurl_status make_scene(traced *t, knurl_error *error)
     return status;
 }
 
-bool traced_make(const oracle_def *def, const traced_options *options, int threads, traced *out)
+bool traced_make(const oracle_def *def, const char *method, int threads, traced *out)
 {
     knurl_error error = {.message = ""};
     knurl_heightmap *map = NULL;
@@ -72,7 +70,7 @@ bool traced_make(const oracle_def *def, const traced_options *options, int threa
     context.threads = threads;
     knurl_status status = knurl_context_create(&context, &out->context, &error);
     if (status == KNURL_OK) status = make_map(out, def, &map, &error);
-    if (status == KNURL_OK) status = make_surface(out, def, options, map, &error);
+    if (status == KNURL_OK) status = make_surface(out, def, method, map, &error);
     if (status == KNURL_OK) status = make_scene(out, &error);
     knurl_heightmap_release(map);
     if (status == KNURL_OK) return true;

@@ -6,13 +6,6 @@
 
 #include <knurl/knurl.h>
 
-typedef struct traced_options {
-    const char *method;
-    bool inversion;
-    knurl_bounds_kind bounds;
-    double marching_scale; /* 0: the library's default */
-} traced_options;
-
 typedef struct traced {
     knurl_context *context;
     knurl_surface *surface;
@@ -21,7 +14,7 @@ typedef struct traced {
 } traced;
 
 /* On failure writes the library's message to standard output and returns false. */
-bool traced_make(const oracle_def *def, const traced_options *options, int threads, traced *out);
+bool traced_make(const oracle_def *def, const char *method, int threads, traced *out);
 void traced_free(traced *t);
 knurl_ray traced_ray(const traced *t, const oracle_ray *ray);
 

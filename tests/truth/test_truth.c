@@ -20,30 +20,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { THREADS = 2, FULL_RAYS = 7000, PRINTED = 12, MAX_VARIANTS = 32 };
+enum { THREADS = 2, FULL_RAYS = 7000, PRINTED = 12 };
 
 typedef struct variant {
-    const char *name;
-    traced_options options;
+    const char *method;
     double share; /* of the rays */
 } variant;
 
-/* Methods under test; a method joins by its name here. */
-static const char *const METHODS[] = {"rmip"};
+/* Exact methods under test; a method joins by its line here. */
+static const variant VARIANTS[] = {
+    {"rmip", 1.0},
+    {"rmip:inversion=off", 0.25},
+    {"rmip:bounds=minmax", 0.25},
+    {"rmip:marching-scale=1", 0.25},
+    {"rmip:inversion=off:bounds=minmax:marching-scale=1", 0.25},
+};
 
-static int make_variants(variant *out)
-{
-    int count = 0;
-    for (size_t i = 0; i < sizeof METHODS / sizeof METHODS[0]; i++) {
-        const char *m = METHODS[i];
-        out[count++] = (variant){"default", {m, true, KNURL_BOUNDS_RMIP, 0.0}, 1.0};
-        out[count++] = (variant){"no inversion", {m, false, KNURL_BOUNDS_RMIP, 0.0}, 0.25};
-        out[count++] = (variant){"minmax", {m, true, KNURL_BOUNDS_MINMAX, 0.0}, 0.25};
-        out[count++] = (variant){"marching 1", {m, true, KNURL_BOUNDS_RMIP, 1.0}, 0.25};
-        out[count++] = (variant){"all three", {m, false, KNURL_BOUNDS_MINMAX, 1.0}, 0.25};
-    }
-    return count;
-}
+enum { VARIANT_COUNT = sizeof VARIANTS / sizeof VARIANTS[0] };
 
 static double truth_scale(void)
 {
@@ -124,8 +117,8 @@ static void print_row(const job *j, const variant *v)
         high = t->relative[(t->hits - 1) * 99 / 100];
         worst = t->relative[t->hits - 1];
     }
-    printf("%-18s %-6s %-13s %9llu %9llu %6llu %6llu %6llu %6llu  %8.1e %8.1e %8.1e %8.1e\n", j->scene->name,
-           v->options.method, v->name, (unsigned long long)t->rays, (unsigned long long)t->hits,
+    printf("%-18s %-32.32s %9llu %9llu %6llu %6llu %6llu %6llu  %8.1e %8.1e %8.1e %8.1e\n", j->scene->name,
+           v->method, (unsigned long long)t->rays, (unsigned long long)t->hits,
            (unsigned long long)t->verdicts[COMPARE_MISSED], (unsigned long long)t->verdicts[COMPARE_FALSE],
            (unsigned long long)t->verdicts[COMPARE_OCCLUDED], (unsigned long long)t->verdicts[COMPARE_UNSURE],
            median, high, worst, t->worst_across / oracle_scale(j->o));
@@ -143,7 +136,7 @@ static void print_row(const job *j, const variant *v)
 static uint64_t run_variant(const truth_scene *scene, const oracle *o, const variant *v, tally *sum)
 {
     traced t;
-    assert_true(traced_make(&scene->def, &v->options, 1, &t));
+    assert_true(traced_make(&scene->def, v->method, 1, &t));
     job j = {.scene = scene, .o = o, .t = &t};
     double rays = FULL_RAYS * truth_scale() * v->share * (scene->wide ? 0.2 : 1.0);
     j.rays_per_family = rays < 8.0 ? 8 : (uint64_t)rays;
@@ -202,19 +195,17 @@ static bool scene_wanted(const char *name)
 static void agrees_with_the_oracle(void **state)
 {
     (void)state;
-    variant variants[MAX_VARIANTS];
-    int variant_count = make_variants(variants);
     uint64_t wrong = 0;
     tally sum = {.rays = 0};
-    printf("%-18s %-6s %-13s %9s %9s %6s %6s %6s %6s  %8s %8s %8s %8s\n", "scene", "method", "variant",
-           "rays", "hits", "missed", "false", "occl.", "unsure", "dt/t 50%", "99%", "max", "across");
+    printf("%-18s %-32s %9s %9s %6s %6s %6s %6s  %8s %8s %8s %8s\n", "scene", "method", "rays", "hits",
+           "missed", "false", "occl.", "unsure", "dt/t 50%", "99%", "max", "across");
     for (int i = 0; i < truth_scene_count(); i++) {
         truth_scene scene;
         assert_true(truth_scene_make(i, &scene));
         if (scene_wanted(scene.name)) {
             oracle *o = oracle_create(&scene.def);
             assert_non_null(o);
-            for (int v = 0; v < variant_count; v++) wrong += run_variant(&scene, o, &variants[v], &sum);
+            for (int v = 0; v < (int)VARIANT_COUNT; v++) wrong += run_variant(&scene, o, &VARIANTS[v], &sum);
             oracle_destroy(o);
         }
         truth_scene_free(&scene);
@@ -253,7 +244,7 @@ static uint64_t replay(const truth_scene *scene, const oracle *o, const variant 
     traced t;
     char line[512], name[64];
     uint64_t wrong = 0;
-    assert_true(traced_make(&scene->def, &v->options, 1, &t));
+    assert_true(traced_make(&scene->def, v->method, 1, &t));
     rewind(file);
     while (fgets(line, sizeof line, file)) {
         oracle_ray ray;
@@ -261,7 +252,7 @@ static uint64_t replay(const truth_scene *scene, const oracle *o, const variant 
         compare_result r = compare_ray(o, &t, &ray);
         *rays += 1;
         if (r.verdict <= COMPARE_UNSURE) continue;
-        printf("%s: ", v->name);
+        printf("%s: ", v->method);
         compare_print(scene->name, o, &ray, &r);
         wrong++;
     }
@@ -274,15 +265,13 @@ static void regressions_stay_fixed(void **state)
     (void)state;
     FILE *file = fopen(KNURL_SOURCE_DIR "/tests/truth/regressions.csv", "r");
     assert_non_null(file);
-    variant variants[MAX_VARIANTS];
-    int variant_count = make_variants(variants);
     uint64_t wrong = 0, rays = 0;
     for (int i = 0; i < truth_scene_count(); i++) {
         truth_scene scene;
         assert_true(truth_scene_make(i, &scene));
         oracle *o = oracle_create(&scene.def);
         assert_non_null(o);
-        for (int v = 0; v < variant_count; v++) wrong += replay(&scene, o, &variants[v], file, &rays);
+        for (int v = 0; v < (int)VARIANT_COUNT; v++) wrong += replay(&scene, o, &VARIANTS[v], file, &rays);
         oracle_destroy(o);
         truth_scene_free(&scene);
     }

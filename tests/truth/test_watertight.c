@@ -53,12 +53,11 @@ static double truth_scale(void)
 static torus make_torus(const torus_case *c)
 {
     torus out = {.description = c};
-    traced_options options = {c->method, true, KNURL_BOUNDS_RMIP, 0.0};
     assert_true(truth_torus_make(&out.scene, c->name, c->around, c->across, c->factor, c->offset, c->at));
     out.scene.def.uv_scale[0] = out.scene.def.uv_scale[1] = c->tiles;
     out.o = oracle_create(&out.scene.def);
     assert_non_null(out.o);
-    assert_true(traced_make(&out.scene.def, &options, 2, &out.t));
+    assert_true(traced_make(&out.scene.def, c->method, 2, &out.t));
     out.rays = malloc(BATCH * sizeof *out.rays);
     out.hits = malloc(BATCH * sizeof *out.hits);
     assert_true(out.rays && out.hits);

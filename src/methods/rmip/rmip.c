@@ -10,26 +10,28 @@
 
 #include <float.h>
 
+static const knurl_method_parameter PARAMETERS[] = {
+    {"marching-scale", "texels; bounds at most this long are marched (section 4.4)", 6.0, 1.0, 4096.0, NULL},
+    {"inversion", "tighten bounds by inverting box entry and exit (Algorithm 1, line 15)", 1.0, 0.0, 1.0,
+     "off|on"},
+    {"bounds", "range structure; minmax covers a rectangle by up to 2 x 2 nodes of the mipmap", 1.0, 0.0, 1.0,
+     "minmax|rmip"},
+    {0}};
+
 typedef struct rmip_parameters {
-    knurl_context *context;
-    double marching_scale; /* texels; shorter bounds are marched (section 4.4) */
+    double marching_scale;
+    bool inversion;
     knurl_bounds_kind bounds;
-    bool inversion; /* line 15 of Algorithm 1 */
 } rmip_parameters;
 
-static knurl_status rmip_build(const shell_space *space, const knurl_surface_def *def, void **data,
+static knurl_status rmip_build(const shell_space *space, const double *values, void **data,
                                knurl_error *error)
 {
     rmip_parameters *p = knurl_alloc_zero(space->context, sizeof *p);
     *data = p;
     if (!p) return knurl_fail_memory(error, sizeof *p, "method rmip");
-    if (!(def->marching_scale >= 0.0 && def->marching_scale <= 1e6)) {
-        knurl_free(space->context, p);
-        *data = NULL;
-        return knurl_fail(error, KNURL_ERROR_ARGUMENT, "marching_scale is %g, expected 0 to 1e6 texels",
-                          def->marching_scale);
-    }
-    *p = (rmip_parameters){space->context, def->marching_scale, def->bounds, def->inversion};
+    *p = (rmip_parameters){values[0], values[1] != 0.0,
+                           values[2] != 0.0 ? KNURL_BOUNDS_RMIP : KNURL_BOUNDS_MINMAX};
     return KNURL_OK;
 }
 
@@ -259,7 +261,8 @@ static bool rmip_intersect(const void *data, const method_query *q)
 const method method_rmip = {
     .name = "rmip",
     .summary = "inversion and oblong bounds (Thonat et al. 2023); exact",
-    .capabilities = METHOD_EXACT | METHOD_LOD | METHOD_FOLDED,
+    .flags = KNURL_METHOD_EXACT,
+    .parameters = PARAMETERS,
     .build = rmip_build,
     .intersect = rmip_intersect,
     .bytes = rmip_bytes,
