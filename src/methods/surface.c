@@ -1,6 +1,7 @@
 /* The public surface: mesh, map and method together. */
 #include "methods/method.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 struct knurl_surface {
@@ -116,13 +117,25 @@ static void fill_info(knurl_surface *surface, uint64_t replaced)
     info->height_min = h0 <= h1 ? h0 : 0.0;
     info->height_max = h0 <= h1 ? h1 : 0.0;
     info->texels = texels;
-    info->seam_edges = base_mesh_seam_edges(space->context, &space->mesh);
+    info->seam_edges = shell_seam_edges(space);
     info->mesh_bytes = (uint64_t)space->mesh.vertex_count * 32 + (uint64_t)space->mesh.triangle_count * 12;
     info->shell_bytes =
         (uint64_t)space->mesh.triangle_count * sizeof(shell) + surface->method->bytes(surface->data);
     info->map_bytes = map_bytes(space->map);
     /* Two triangles per texel at the 85 bytes per triangle that Embree 3.13 was measured to need. */
     info->tessellated_bytes = (uint64_t)(170.0 * texels);
+}
+
+/* Heights are stored as floats and enter products with positions, which have the same limit. */
+static knurl_status check_heights(const shell_space *space, knurl_error *error)
+{
+    knurl_range r = knurl_heightmap_range(space->map);
+    double most = fabs(space->offset) + fabs(space->factor) * max_d(fabs(r.min), fabs(r.max));
+    if (most < 1e18) return KNURL_OK;
+    return knurl_fail(
+        error, KNURL_ERROR_ARGUMENT,
+        "displacement reaches %g (offset %g, factor %g, map from %g to %g), expected below 1e18", most,
+        space->offset, space->factor, r.min, r.max);
 }
 
 static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *def, const double *values,
@@ -143,6 +156,7 @@ static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *
         space->map = knurl_heightmap_retain(d->map);
     else
         status = make_flat_map(space->context, &space->map, error);
+    if (status == KNURL_OK) status = check_heights(space, error);
     if (status == KNURL_OK) status = shell_space_build(space, error);
     if (status == KNURL_OK) status = surface->method->build(space, values, &surface->data, error);
     return status;
@@ -215,6 +229,22 @@ bool knurl_surface_shell_bounds(const knurl_surface *surface, uint32_t shell_ind
     return true;
 }
 
+/* Methods form products of several direction components, so that very long and very short directions
+ * would overflow. A power of two takes the length out of the direction and into t, without rounding.
+ * Returns the exponent. */
+static int scale_direction(const knurl_ray *ray, knurl_ray *scaled)
+{
+    enum { PLAIN_EXPONENT = 64 };
+    *scaled = *ray;
+    double longest = v3_max_component(v3_abs(v3_load(ray->direction)));
+    int exponent = longest > 0.0 && isfinite(longest) ? ilogb(longest) : 0;
+    if (abs(exponent) <= PLAIN_EXPONENT) return 0;
+    for (int i = 0; i < 3; i++) scaled->direction[i] = ldexp(ray->direction[i], -exponent);
+    scaled->tmin = ldexp(ray->tmin, exponent);
+    scaled->tmax = ldexp(ray->tmax, exponent);
+    return exponent;
+}
+
 static bool query(const knurl_surface *surface, uint32_t triangle, const knurl_ray *ray, bool any,
                   knurl_hit *hit)
 {
@@ -223,11 +253,15 @@ static bool query(const knurl_surface *surface, uint32_t triangle, const knurl_r
     height_lod lod;
     triangle_frame frame;
     shell_root root;
+    knurl_ray scaled;
     uint32_t steps = 0;
+    int exponent = scale_direction(ray, &scaled);
     height_lod_make(space, (double)ray->lod, &lod);
     triangle_frame_load(space, triangle, &lod, &frame);
-    method_query q = {space, &lod, &frame, ray, any, &root, &steps};
+    method_query q = {space, &lod, &frame, &scaled, any, &root, &steps};
     bool found = surface->method->intersect(surface->data, &q);
+    if (found && exponent != 0) root.t = ldexp(root.t, -exponent);
+    found = found && isfinite(root.t);
     if (!hit) return found;
     hit->steps += steps;
     if (found) {

@@ -361,36 +361,41 @@ static double texel_error(const triangle_frame *f, double e)
     return e * (fabs(f->xe) + fabs(f->xf) + fabs(f->ye) + fabs(f->yf));
 }
 
+/* How far the quadratics are from the exact curve at the ends of its stretches, which is where they
+ * are worst, in b and, as height_remainder, in s; allows for four times what is found. Returns the
+ * distance in b. */
+static double measure_remainder(ray_curve *c)
+{
+    double worst = 0.0, worst_height = 0.0;
+    for (int i = 0; i < c->interval_count; i++)
+        for (int end = 0; end < 2; end++) {
+            double p = end ? c->intervals[i].out : c->intervals[i].in;
+            double inverse = c->by_depth ? 1.0 : 1.0 / quadratic_at(&c->w, p);
+            curve_point at = curve_at(c, p);
+            worst = max_d(worst, max_d(fabs(at.b1 - quadratic_at(&c->b1, p) * inverse),
+                                       fabs(at.b2 - quadratic_at(&c->b2, p) * inverse)));
+            worst_height = max_d(worst_height, fabs(at.s - (c->by_depth ? quadratic_at(&c->s, p) : p)));
+        }
+    c->height_remainder = 4.0 * worst_height + c->height_rounding;
+    return 4.0 * worst;
+}
+
 /* After height_intervals: where a small W amplified rounding, points are inverted instead. */
 static void settle_height(ray_curve *c, const triangle_frame *f, const ray_view *v, bool steep)
 {
     if (steep || c->interval_count == 0) return;
     curve_point near = curve_at(c, 0.5 * (c->intervals[0].in + c->intervals[0].out));
-    c->texel_remainder = texel_error(f, c->barycentric_rounding);
+    double amplified = c->barycentric_rounding;
     set_inversion_rounding(f, v, v3(near.b1, near.b2, near.s), c);
     c->refine = true;
+    c->texel_remainder = texel_error(f, max_d(amplified, measure_remainder(c)));
     settle_intervals(c);
-}
-
-/* How far the quadratics are from the exact curve at the ends of its stretches, which is where they
- * are worst; false if it is so far that a single Newton step is not enough. */
-static bool measure_remainder(const ray_curve *c, double *worst)
-{
-    *worst = 0.0;
-    for (int i = 0; i < c->interval_count; i++)
-        for (int end = 0; end < 2; end++) {
-            double p = end ? c->intervals[i].out : c->intervals[i].in;
-            curve_point at = curve_at(c, p);
-            *worst = max_d(
-                *worst, max_d(fabs(at.b1 - quadratic_at(&c->b1, p)), fabs(at.b2 - quadratic_at(&c->b2, p))));
-        }
-    return *worst < 1e-7;
 }
 
 static void depth_intervals(ray_curve *c, const triangle_frame *f, double reach)
 {
     /* With a remainder the first search is wide, and then the ends are moved to the exact curve. */
-    double e = c->refine ? 1e-6 : c->barycentric_rounding, worst = 0.0;
+    double e = c->refine ? 1e-6 : c->barycentric_rounding;
     quadratic b0 = combine(c, 1.0, -1.0, -1.0), above = c->s, below = c->s;
     above.c[0] -= f->s0;
     for (int k = 0; k < 3; k++) below.c[k] = -below.c[k];
@@ -398,9 +403,12 @@ static void depth_intervals(ray_curve *c, const triangle_frame *f, double reach)
     double height_error = e * (f->size + fabs(f->s0) + fabs(f->s1)) + c->height_rounding;
     condition conditions[5] = {{b0, e}, {c->b1, e}, {c->b2, e}, {above, height_error}, {below, height_error}};
     find_intervals(c, conditions, 5, -reach, reach);
-    if (c->refine && !measure_remainder(c, &worst)) c->unreliable = true;
-    c->texel_remainder = texel_error(f, 4.0 * worst);
-    if (c->refine && !c->unreliable) settle_intervals(c);
+    if (!c->refine) return;
+    double remainder = measure_remainder(c);
+    c->texel_remainder = texel_error(f, remainder);
+    /* So far off that a single Newton step is not enough. */
+    if (!(remainder < 4e-7)) c->unreliable = true;
+    if (!c->unreliable) settle_intervals(c);
 }
 
 /* Farthest depth, from the ray's point nearest to the centre, that the shell can reach. */
@@ -504,7 +512,7 @@ void ray_curve_make(const triangle_frame *f, const knurl_ray *ray, ray_curve *c)
     view_make(f, ray, &v);
     c->interval_count = 0;
     c->by_depth = c->refine = c->unreliable = false;
-    c->texel_remainder = c->height_rounding = 0.0;
+    c->texel_remainder = c->height_remainder = c->height_rounding = 0.0;
     c->frame = f;
     c->origin = v3_sub(v3_load(ray->origin), f->base);
     c->direction = v3_load(ray->direction);

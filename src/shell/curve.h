@@ -45,6 +45,7 @@ typedef struct ray_curve {
     double height_rounding;                        /* the same for s */
     double texel_rounding;                         /* bound on the error of x and y at a parameter */
     double texel_remainder;                        /* how far the quadratics x and y may be from that */
+    double height_remainder;                       /* the same for s at a parameter */
     curve_interval intervals[CURVE_MAX_INTERVALS]; /* front to back */
     int interval_count;
     bool unreliable; /* could not be followed: use shell_subdivide() */

@@ -179,7 +179,8 @@ static void normal_range(const shell_walk *walk, const curve_point *in, const cu
      * (x, y) to b is linear; without one (flat uv) the whole triangle bounds N. */
     double move = v3_length(f->ne) + v3_length(f->nf);
     if (!(f->flags & SHELL_FLAT_UV)) {
-        double dx = fabs(out->x - in->x), dy = fabs(out->y - in->y);
+        double pad = 2.0 * (walk->curve->texel_remainder + walk->curve->texel_rounding);
+        double dx = fabs(out->x - in->x) + pad, dy = fabs(out->y - in->y) + pad;
         double db1 = fabs(f->inverse_uv[0]) * dx + fabs(f->inverse_uv[1]) * dy;
         double db2 = fabs(f->inverse_uv[2]) * dx + fabs(f->inverse_uv[3]) * dy;
         move = min_d(move, v3_length(f->ne) * db1 + v3_length(f->nf) * db2);
@@ -197,8 +198,8 @@ static void height_span(const ray_curve *c, double a, double b, double span[2])
         sb = quadratic_at(&c->s, b);
         bow = 0.25 * fabs(c->s.c[2]) * (b - a) * (b - a);
     }
-    span[0] = min_d(sa, sb) - bow;
-    span[1] = max_d(sa, sb) + bow;
+    span[0] = min_d(sa, sb) - bow - c->height_remainder;
+    span[1] = max_d(sa, sb) + bow + c->height_remainder;
 }
 
 typedef struct march_state {
@@ -212,17 +213,18 @@ typedef struct march_state {
     bool have_carried;
 } march_state;
 
-/* Whether s |N| stays outside [patch.min, patch.max] over [a, b]. */
-static bool clears_patch(const march_state *m, const cell_function *f, double a, double b)
+/* Whether s |N| stays outside [min, max] over [a, b] of the curve. */
+static bool clears(const ray_curve *c, const double normal[2], double a, double b, double min, double max)
 {
     double span[2];
-    height_span(m->walk->curve, a, b, span);
-    double z0 = span[0] * (span[0] < 0.0 ? m->normal[1] : m->normal[0]);
-    double z1 = span[1] * (span[1] > 0.0 ? m->normal[1] : m->normal[0]);
-    return z0 > f->patch.max + 2.0 * f->rounding || z1 < f->patch.min - 2.0 * f->rounding;
+    height_span(c, a, b, span);
+    double z0 = span[0] * (span[0] < 0.0 ? normal[1] : normal[0]);
+    double z1 = span[1] * (span[1] > 0.0 ? normal[1] : normal[0]);
+    return z0 > max || z1 < min;
 }
 
-static double g_rounding(const shell_walk *walk, const height_patch *patch)
+/* Bound on the error of g where |h| <= `height` and |h_x| + |h_y| <= `slope`. */
+static double g_rounding(const shell_walk *walk, double slope, double height)
 {
     const triangle_frame *f = walk->frame;
     double s = max_d(fabs(f->s0), fabs(f->s1));
@@ -230,8 +232,8 @@ static double g_rounding(const shell_walk *walk, const height_patch *patch)
                                      : walk->curve->barycentric_rounding * s *
                                            (fabs(f->ne.x) + fabs(f->ne.y) + fabs(f->ne.z) + fabs(f->nf.x) +
                                             fabs(f->nf.y) + fabs(f->nf.z));
-    return patch->slope * walk->curve->texel_rounding + normals + walk->curve->height_rounding +
-           32.0 * DBL_EPSILON * (s + max_d(fabs(patch->min), fabs(patch->max)));
+    return slope * walk->curve->texel_rounding + normals + walk->curve->height_rounding +
+           32.0 * DBL_EPSILON * (s + height);
 }
 
 /* Whether the surface touches the ray at an end of the march within rounding, where what comes next may
@@ -253,9 +255,10 @@ static bool visit(march_state *m, double a, double b)
     height_patch_load(m->walk->space, m->walk->lod, m->walk->frame, (int64_t)m->cell[0], (int64_t)m->cell[1],
                       m->families > 2 ? (int64_t)m->cell[2] : 0, m->families > 2 ? (int64_t)m->cell[3] : 0,
                       &f.patch);
-    f.rounding = g_rounding(m->walk, &f.patch);
+    f.rounding = g_rounding(m->walk, f.patch.slope, max_d(fabs(f.patch.min), fabs(f.patch.max)));
     m->walk->steps++;
-    if (clears_patch(m, &f, a, b)) {
+    if (clears(m->walk->curve, m->normal, a, b, f.patch.min - 2.0 * f.rounding,
+               f.patch.max + 2.0 * f.rounding)) {
         m->have_carried = false;
         return false;
     }
@@ -310,4 +313,13 @@ bool shell_march(shell_walk *walk, double in, double out)
         m.lines[next].line += m.lines[next].step;
         next_crossing(&m.lines[next], walk->curve, at, out);
     }
+}
+
+bool shell_curve_clears(const shell_walk *walk, double in, double out, knurl_range h)
+{
+    curve_point first = curve_at(walk->curve, in), last = curve_at(walk->curve, out);
+    double normal[2];
+    normal_range(walk, &first, &last, normal);
+    double pad = 2.0 * g_rounding(walk, h.max - h.min, max_d(fabs(h.min), fabs(h.max)));
+    return clears(walk->curve, normal, in, out, h.min - pad, h.max + pad);
 }

@@ -22,4 +22,8 @@ typedef struct shell_walk {
  * within the zone that the side lies in, that is a hit, because what comes next may see the other sign. */
 bool shell_march(shell_walk *walk, double in, double out);
 
+/* Whether the curve keeps away from every surface with heights in `h` from `in` to `out`, by its height
+ * alone: no box, no inverse of (u, v). x and y are monotone between the two. */
+bool shell_curve_clears(const shell_walk *walk, double in, double out, knurl_range h);
+
 #endif

@@ -1,6 +1,7 @@
 /* Copying and checking a base mesh; angle-weighted normals; seams. */
 #include "shell/shell.h"
 
+#include <float.h>
 #include <string.h>
 
 static knurl_status check_indices(const knurl_mesh_view *view, knurl_error *error)
@@ -182,14 +183,31 @@ void base_mesh_free(knurl_context *context, base_mesh *mesh)
     *mesh = (base_mesh){0};
 }
 
-/* An inner edge: its two welded ends, and the texture coordinates there. */
+/* An inner edge: its two welded ends, and the map coordinates there. */
 typedef struct edge_entry {
     uint32_t low, high;
-    float uv[4];
+    vec2 uv[2];
     uint32_t uses;
 } edge_entry;
 
-static uint64_t add_edge(edge_entry *table, size_t capacity, const edge_entry *edge)
+/* Whether two coordinates read the same column of the map: repeat wraps by 1, mirrored repeat by 2. */
+static bool same_coordinate(double a, double b, knurl_wrap wrap)
+{
+    double period = wrap == KNURL_WRAP_REPEAT ? 1.0 : 2.0, d = fabs(a - b);
+    if (wrap != KNURL_WRAP_CLAMP) d = fabs(d - period * round(d / period));
+    return d <= 4.0 * DBL_EPSILON * (fabs(a) + fabs(b));
+}
+
+static bool same_edge(const shell_space *space, const edge_entry *a, const edge_entry *b)
+{
+    bool same = true;
+    for (int i = 0; i < 2; i++)
+        same = same && same_coordinate(a->uv[i].x, b->uv[i].x, space->wrap_u) &&
+               same_coordinate(a->uv[i].y, b->uv[i].y, space->wrap_v);
+    return same;
+}
+
+static uint64_t add_edge(const shell_space *space, edge_entry *table, size_t capacity, const edge_entry *edge)
 {
     size_t slot = (edge->low * 2654435761u ^ edge->high * 40503u * 65537u) & (capacity - 1);
     while (table[slot].uses && (table[slot].low != edge->low || table[slot].high != edge->high))
@@ -200,33 +218,35 @@ static uint64_t add_edge(edge_entry *table, size_t capacity, const edge_entry *e
         return 0;
     }
     table[slot].uses++;
-    return table[slot].uses == 2 && memcmp(table[slot].uv, edge->uv, sizeof edge->uv) != 0;
+    return table[slot].uses == 2 && !same_edge(space, &table[slot], edge);
 }
 
-uint64_t base_mesh_seam_edges(knurl_context *context, const base_mesh *mesh)
+uint64_t shell_seam_edges(const shell_space *space)
 {
+    const base_mesh *mesh = &space->mesh;
     size_t capacity = 16;
     while (capacity < 6 * (size_t)mesh->triangle_count) capacity *= 2;
-    uint32_t *first = knurl_alloc_array(context, mesh->vertex_count, sizeof *first);
-    edge_entry *table = knurl_alloc_array(context, capacity, sizeof *table);
+    uint32_t *first = knurl_alloc_array(space->context, mesh->vertex_count, sizeof *first);
+    edge_entry *table = knurl_alloc_array(space->context, capacity, sizeof *table);
     uint64_t seams = 0;
-    if (first && table && weld(context, mesh->positions, mesh->vertex_count, first)) {
+    if (first && table && weld(space->context, mesh->positions, mesh->vertex_count, first)) {
         memset(table, 0, capacity * sizeof *table);
-        for (size_t t = 0; t < mesh->triangle_count; t++)
-            for (int i = 0; i < 3; i++) {
-                uint32_t a = mesh->triangles[3 * t + (size_t)i],
-                         b = mesh->triangles[3 * t + (size_t)((i + 1) % 3)];
-                if (first[a] > first[b]) {
-                    uint32_t swap = a;
-                    a = b;
-                    b = swap;
-                }
-                const float *ta = mesh->texcoords + 2 * (size_t)a, *tb = mesh->texcoords + 2 * (size_t)b;
-                edge_entry edge = {first[a], first[b], {ta[0], ta[1], tb[0], tb[1]}, 0};
-                if (edge.low != edge.high) seams += add_edge(table, capacity, &edge);
+        for (size_t i = 0; i < 3 * (size_t)mesh->triangle_count; i++) {
+            uint32_t v[2] = {mesh->triangles[i], mesh->triangles[i % 3 == 2 ? i - 2 : i + 1]};
+            if (first[v[0]] > first[v[1]]) {
+                uint32_t swap = v[0];
+                v[0] = v[1];
+                v[1] = swap;
             }
+            edge_entry edge = {.low = first[v[0]], .high = first[v[1]]};
+            for (int k = 0; k < 2; k++) {
+                const float *st = mesh->texcoords + 2 * (size_t)v[k];
+                edge.uv[k] = shell_uv(space, (double)st[0], (double)st[1]);
+            }
+            if (edge.low != edge.high) seams += add_edge(space, table, capacity, &edge);
+        }
     }
-    knurl_free(context, first);
-    knurl_free(context, table);
+    knurl_free(space->context, first);
+    knurl_free(space->context, table);
     return seams;
 }

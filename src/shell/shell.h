@@ -131,7 +131,8 @@ void shell_hit_fill(const shell_space *space, const height_lod *lod, const trian
 knurl_status base_mesh_copy(knurl_context *context, const knurl_mesh_view *view, base_mesh *mesh,
                             uint64_t *replaced_normals, knurl_error *error);
 void base_mesh_free(knurl_context *context, base_mesh *mesh);
-uint64_t base_mesh_seam_edges(knurl_context *context, const base_mesh *mesh);
+/* Inner edges whose two sides read different places of the map. */
+uint64_t shell_seam_edges(const shell_space *space);
 /* Fills space->shells and space->texel_size from everything else. */
 knurl_status shell_space_build(shell_space *space, knurl_error *error);
 /* Box of a shell, rounded outwards; false for SHELL_EMPTY. */

@@ -8,12 +8,18 @@
 
 #include <float.h>
 
-enum { SUBDIVIDE_DEPTH = 44, SUBDIVIDE_STACK = 3 * SUBDIVIDE_DEPTH + 8 };
+/* Halvings: dividing a piece in four counts as two. Each level leaves at most three pieces waiting per
+ * two halvings. */
+enum { SUBDIVIDE_DEPTH = 88, SUBDIVIDE_STACK = 3 * SUBDIVIDE_DEPTH / 2 + 8 };
+/* Where interpolated normals are shorter than this, opposing normals meet and S has no direction: such
+ * pieces, thinner than this against the triangle, are not part of the surface. */
+static const double NO_NORMAL = 1e-9;
 
 /* Part of the base triangle: three corners in barycentrics. */
 typedef struct piece {
     double b1[3], b2[3];
     int depth;
+    bool turning; /* its normals turn by so much that they do not bound the surface: divide across that */
 } piece;
 
 typedef struct search {
@@ -24,7 +30,8 @@ typedef struct search {
     vec3 origin, direction, inverse; /* the ray, relative to vertex 0 */
     vec3 across1, across2;           /* orthonormal, across the direction */
     double pad;                      /* bound on the rounding of a box */
-    double tmin, tmax;
+    double t0;                       /* ray parameter that depths count from */
+    double tmin, tmax;               /* range of depth */
     bool found;
     shell_root root;
 } search;
@@ -34,8 +41,8 @@ static vec3 at_corner(vec3 base, vec3 e, vec3 g, double b1, double b2)
     return v3_mad(v3_mad(base, b1, e), b2, g);
 }
 
-/* Box of S over a piece whose heights are in `h`. */
-static void piece_box(const search *s, const piece *p, knurl_range h, vec3 *lower, vec3 *upper)
+/* Box of S over a piece whose heights are in `h`. Sets p->turning. False if there is no surface. */
+static bool piece_box(const search *s, piece *p, knurl_range h, vec3 *lower, vec3 *upper)
 {
     const triangle_frame *f = s->f;
     vec3 position[3], normal[3];
@@ -49,6 +56,8 @@ static void piece_box(const search *s, const piece *p, knurl_range h, vec3 *lowe
     double shortest = v3_length(normal[0]) - move, s0 = h.min, s1 = h.max;
     *lower = v3_min(position[0], v3_min(position[1], position[2]));
     *upper = v3_max(position[0], v3_max(position[1], position[2]));
+    p->turning = !f->unnormalised && shortest < 0.25 * longest;
+    if (!f->unnormalised && longest < NO_NORMAL) return false;
     if (!f->unnormalised && shortest < 1e-3 * longest) {
         double reach = max_d(fabs(h.min), fabs(h.max));
         *lower = v3_sub(*lower, v3(reach, reach, reach));
@@ -68,6 +77,7 @@ static void piece_box(const search *s, const piece *p, knurl_range h, vec3 *lowe
     }
     *lower = v3_sub(*lower, v3(s->pad, s->pad, s->pad));
     *upper = v3_add(*upper, v3(s->pad, s->pad, s->pad));
+    return true;
 }
 
 static bool ray_meets_box(const search *s, vec3 lower, vec3 upper)
@@ -182,7 +192,7 @@ static verdict judge(const search *s, const piece *p, const height_patch *patch,
     double det = c->a1 * c->c2 - c->a2 * c->c1;
     double sum = fabs(c->a1) + fabs(c->a2) + fabs(c->c1) + fabs(c->c2);
     if (spread * sum < 0.25 * fabs(det)) return AT_MOST_ONE;
-    return thin < s->pad || p->depth == SUBDIVIDE_DEPTH ? TOO_SMALL : DIVIDE;
+    return !(thin >= s->pad) || p->depth >= SUBDIVIDE_DEPTH ? TOO_SMALL : DIVIDE;
 }
 
 static bool newton(const search *s, const height_patch *patch, double *b1, double *b2, across *at)
@@ -230,7 +240,7 @@ static bool keep_root(search *s, const height_patch *patch, const across *at, do
     double e = 1e-12 + s->pad / max_d(at->size, DBL_MIN);
     if (b1 < -e || b2 < -e || b1 + b2 > 1.0 + e) return false;
     if (!(at->depth >= s->tmin && at->depth <= s->tmax)) return false;
-    s->root = (shell_root){at->depth, b1, b2, at->x, at->y, *patch};
+    s->root = (shell_root){s->t0 + at->depth, b1, b2, at->x, at->y, *patch};
     s->tmax = at->depth;
     s->found = true;
     return true;
@@ -311,35 +321,81 @@ static bool try_piece(search *s, const piece *p, const extent *e)
     return done;
 }
 
-static void push_children(piece *stack, int *top, const piece *p)
+static void push_quarters(piece *stack, int *top, const piece *p)
 {
     double m1[3], m2[3]; /* midpoints opposite to corner i */
     for (int i = 0; i < 3; i++) {
         m1[i] = 0.5 * (p->b1[(i + 1) % 3] + p->b1[(i + 2) % 3]);
         m2[i] = 0.5 * (p->b2[(i + 1) % 3] + p->b2[(i + 2) % 3]);
     }
-    int depth = p->depth + 1;
-    stack[(*top)++] = (piece){{m1[0], m1[1], m1[2]}, {m2[0], m2[1], m2[2]}, depth};
-    stack[(*top)++] = (piece){{p->b1[0], m1[2], m1[1]}, {p->b2[0], m2[2], m2[1]}, depth};
-    stack[(*top)++] = (piece){{m1[2], p->b1[1], m1[0]}, {m2[2], p->b2[1], m2[0]}, depth};
-    stack[(*top)++] = (piece){{m1[1], m1[0], p->b1[2]}, {m2[1], m2[0], p->b2[2]}, depth};
+    int depth = p->depth + 2;
+    stack[(*top)++] = (piece){{m1[0], m1[1], m1[2]}, {m2[0], m2[1], m2[2]}, depth, false};
+    stack[(*top)++] = (piece){{p->b1[0], m1[2], m1[1]}, {p->b2[0], m2[2], m2[1]}, depth, false};
+    stack[(*top)++] = (piece){{m1[2], p->b1[1], m1[0]}, {m2[2], p->b2[1], m2[0]}, depth, false};
+    stack[(*top)++] = (piece){{m1[1], m1[0], p->b1[2]}, {m2[1], m2[0], p->b2[2]}, depth, false};
+}
+
+/* Across the edge along which the normal changes most. Around a line where opposing normals meet this
+ * makes pieces thin and long, of which there are few; quarters would grow by two with each level. */
+static void push_halves(const triangle_frame *f, piece *stack, int *top, const piece *p)
+{
+    int apex = 0; /* the corner opposite to the edge */
+    double most = -1.0;
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        double change = v3_length(v3_mad(v3_scale(f->ne, p->b1[j] - p->b1[k]), p->b2[j] - p->b2[k], f->nf));
+        if (change > most) {
+            most = change;
+            apex = i;
+        }
+    }
+    int j = (apex + 1) % 3, k = (apex + 2) % 3, depth = p->depth + 1;
+    double m1 = 0.5 * (p->b1[j] + p->b1[k]), m2 = 0.5 * (p->b2[j] + p->b2[k]);
+    stack[(*top)++] = (piece){{p->b1[apex], p->b1[j], m1}, {p->b2[apex], p->b2[j], m2}, depth, false};
+    stack[(*top)++] = (piece){{p->b1[apex], m1, p->b1[k]}, {p->b2[apex], m2, p->b2[k]}, depth, false};
+}
+
+static double near_reciprocal(double x)
+{
+    return 1.0 / (fabs(x) < 1e-300 ? copysign(1e-300, x) : x);
+}
+
+/* a - b in two parts whose sum is exact (Knuth 1969, TwoSum). */
+static double difference(double a, double b, double *rest)
+{
+    double sum = a - b, bb = sum - a;
+    *rest = (a - (sum - bb)) + (-b - bb);
+    return sum;
+}
+
+/* The ray's point at parameter t relative to `base`, rounded once: from a far origin the pieces would
+ * otherwise be judged with the rounding of that distance. */
+static double point_near(double origin, double direction, double base, double t)
+{
+    double rest, relative = difference(origin, base, &rest);
+    return fma(t, direction, relative) + rest;
 }
 
 static void search_make(const shell_space *space, const height_lod *lod, knurl_bounds_kind kind,
                         const triangle_frame *f, const knurl_ray *ray, search *s)
 {
-    *s = (search){.space = space, .lod = lod, .f = f, .kind = kind, .tmin = ray->tmin, .tmax = ray->tmax};
-    vec3 origin = v3_load(ray->origin);
-    s->origin = v3_sub(origin, f->base);
+    *s = (search){.space = space, .lod = lod, .f = f, .kind = kind};
     s->direction = v3_load(ray->direction);
+    /* From here on t counts from the ray's point nearest to vertex 0. */
+    double t0 =
+        v3_dot(v3_sub(f->base, v3_load(ray->origin)), s->direction) / v3_dot(s->direction, s->direction);
+    s->t0 = t0;
+    s->tmin = ray->tmin - t0;
+    s->tmax = ray->tmax - t0;
+    s->origin = v3(point_near(ray->origin[0], ray->direction[0], f->base.x, t0),
+                   point_near(ray->origin[1], ray->direction[1], f->base.y, t0),
+                   point_near(ray->origin[2], ray->direction[2], f->base.z, t0));
     vec3 d = v3_normalize(s->direction), a = v3_abs(d);
     vec3 least = a.x <= a.y && a.x <= a.z ? v3(1, 0, 0) : a.y <= a.z ? v3(0, 1, 0) : v3(0, 0, 1);
     s->across1 = v3_normalize(v3_cross(d, least));
     s->across2 = v3_cross(d, s->across1);
-    double tiny = 1e-300;
-    s->inverse = v3(1.0 / (s->direction.x == 0.0 ? tiny : s->direction.x),
-                    1.0 / (s->direction.y == 0.0 ? tiny : s->direction.y),
-                    1.0 / (s->direction.z == 0.0 ? tiny : s->direction.z));
+    s->inverse =
+        v3(near_reciprocal(s->direction.x), near_reciprocal(s->direction.y), near_reciprocal(s->direction.z));
     s->pad = 16.0 * DBL_EPSILON * (v3_max_component(v3_abs(s->origin)) + f->size + fabs(f->s0) + fabs(f->s1));
 }
 
@@ -351,18 +407,21 @@ bool shell_subdivide(const shell_space *space, const height_lod *lod, knurl_boun
     search_make(space, lod, kind, f, ray, &s);
     piece stack[SUBDIVIDE_STACK];
     int top = 0;
-    stack[top++] = (piece){{0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 0};
+    stack[top++] = (piece){{0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 0, false};
     while (top > 0 && !(any && s.found)) {
         piece p = stack[--top];
         extent e = piece_extent(f, &p);
         knurl_range h = shell_height_range(space, lod, kind, f, e.x0, e.y0, e.x1, e.y1);
         vec3 lower, upper;
         (*steps)++;
-        piece_box(&s, &p, h, &lower, &upper);
-        if (!ray_meets_box(&s, lower, upper)) continue;
+        if (!piece_box(&s, &p, h, &lower, &upper) || !ray_meets_box(&s, lower, upper)) continue;
         bool small = floor_d(e.x1) - floor_d(e.x0) <= 1.0 && floor_d(e.y1) - floor_d(e.y0) <= 1.0;
-        if ((small || p.depth == SUBDIVIDE_DEPTH) && try_piece(&s, &p, &e)) continue;
-        if (p.depth < SUBDIVIDE_DEPTH) push_children(stack, &top, &p);
+        if ((small || p.depth >= SUBDIVIDE_DEPTH) && try_piece(&s, &p, &e)) continue;
+        if (p.depth >= SUBDIVIDE_DEPTH) continue;
+        if (p.turning)
+            push_halves(f, stack, &top, &p);
+        else
+            push_quarters(stack, &top, &p);
     }
     if (s.found) {
         *root = s.root;

@@ -6,9 +6,9 @@
  * are roots of small polynomials of one parameter; the leaf is exact on S of Eq. 1, without
  * micro-triangles; and folded shells, which the paper leaves out, go to shell_subdivide(). */
 #include "methods/method.h"
+#include "shell/cell_box.h"
 #include "shell/march.h"
-
-#include <float.h>
+#include "shell/pieces.h"
 
 static const knurl_method_parameter PARAMETERS[] = {
     {"marching-scale", "texels; bounds at most this long are marched (section 4.4)", 6.0, 1.0, 4096.0, NULL},
@@ -58,9 +58,7 @@ enum { STACK_SIZE = 160 };
 typedef struct traversal {
     const rmip_parameters *parameters;
     shell_walk walk;
-    vec3 origin, inverse; /* ray relative to vertex 0, reciprocal direction */
-    vec3 px, py, nx, ny;  /* derivatives of P and N along texel coordinates x and y */
-    double box_rounding;
+    cell_boxes boxes;
     bound stack[STACK_SIZE];
     int top;
 } traversal;
@@ -69,47 +67,6 @@ static bound make_bound(const ray_curve *c, double in, double out)
 {
     curve_point a = curve_at(c, in), b = curve_at(c, out);
     return (bound){in, out, a.x, a.y, b.x, b.y, curve_depth(c, in), curve_depth(c, out)};
-}
-
-static double reciprocal(double x)
-{
-    return 1.0 / (fabs(x) < 1e-300 ? copysign(1e-300, x) : x);
-}
-
-static void traversal_start(traversal *t)
-{
-    const triangle_frame *f = t->walk.frame;
-    const knurl_ray *ray = t->walk.ray;
-    const double *m = f->inverse_uv;
-    t->top = 0;
-    t->origin = v3_sub(v3_load(ray->origin), f->base);
-    t->inverse =
-        v3(reciprocal(ray->direction[0]), reciprocal(ray->direction[1]), reciprocal(ray->direction[2]));
-    t->px = v3_mad(v3_scale(f->pe, m[0]), m[2], f->pf);
-    t->py = v3_mad(v3_scale(f->pe, m[1]), m[3], f->pf);
-    t->nx = v3_mad(v3_scale(f->ne, m[0]), m[2], f->nf);
-    t->ny = v3_mad(v3_scale(f->ne, m[1]), m[3], f->nf);
-    double s = max_d(fabs(f->s0), fabs(f->s1));
-    t->box_rounding = 1e-12 * (f->size + s) + 16.0 * DBL_EPSILON * v3_max_component(v3_abs(t->origin));
-}
-
-/* Range of s = h / |N| over the rectangle with centre (b1, b2) and N there; |N|^2 is convex, so it is
- * bounded below by its tangent plane and above by adding the square of N's movement. */
-static void height_over_normal(const traversal *t, vec3 n, double rx, double ry, knurl_range h, double *s0,
-                               double *s1)
-{
-    *s0 = h.min;
-    *s1 = h.max;
-    if (t->walk.frame->unnormalised) return;
-    double square = v3_dot(n, n);
-    double drift = 2.0 * (fabs(v3_dot(n, t->nx)) * rx + fabs(v3_dot(n, t->ny)) * ry);
-    double move = v3_length(t->nx) * rx + v3_length(t->ny) * ry;
-    double floor_square = max_d(square - drift, 0.0), lowest = sqrt(square) - move;
-    double low = sqrt(max_d(floor_square, lowest > 0.0 ? lowest * lowest : 0.0)) * (1.0 - 1e-15);
-    double high = sqrt(square + drift + move * move) * (1.0 + 1e-15);
-    low = max_d(low, 1e-3);
-    *s0 = h.min < 0.0 ? h.min / low : h.min / high;
-    *s1 = h.max > 0.0 ? h.max / low : h.max / high;
 }
 
 /* Line 12 and 13 of Algorithm 1: the 3D box of the surface over the rectangle, by range arithmetic
@@ -121,25 +78,21 @@ static bool clip_to_box(const traversal *t, const bound *b, double *t_in, double
     double x0 = min_d(b->x_in, b->x_out) - pad, x1 = max_d(b->x_in, b->x_out) + pad;
     double y0 = min_d(b->y_in, b->y_out) - pad, y1 = max_d(b->y_in, b->y_out) + pad;
     knurl_range h = shell_height_range(t->walk.space, t->walk.lod, t->parameters->bounds, f, x0, y0, x1, y1);
-    double cx = 0.5 * (x0 + x1) - f->x[0], cy = 0.5 * (y0 + y1) - f->y[0], rx = 0.5 * (x1 - x0),
-           ry = 0.5 * (y1 - y0);
-    vec3 n = v3_mad(v3_mad(f->n[0], cx, t->nx), cy, t->ny), p = v3_mad(v3_scale(t->px, cx), cy, t->py);
-    double s0, s1;
-    height_over_normal(t, n, rx, ry, h, &s0, &s1);
-    double sc = 0.5 * (s0 + s1), sr = 0.5 * (s1 - s0);
-    vec3 center = v3_mad(p, sc, n);
-    vec3 half = v3_scale(v3_abs(v3_mad(t->px, sc, t->nx)), rx);
-    half = v3_mad(half, ry, v3_abs(v3_mad(t->py, sc, t->ny)));
-    half = v3_mad(half, sr, v3_mad(v3_mad(v3_abs(n), rx, v3_abs(t->nx)), ry, v3_abs(t->ny)));
-    half = v3_add(half, v3(t->box_rounding, t->box_rounding, t->box_rounding));
-    vec3 to = v3_sub(center, t->origin);
-    vec3 a = v3_mul(v3_sub(to, half), t->inverse), c = v3_mul(v3_add(to, half), t->inverse);
-    vec3 near = v3_min(a, c), far = v3_max(a, c);
-    double in = max_d(near.x, max_d(near.y, near.z)), out = min_d(far.x, min_d(far.y, far.z));
-    double slack = 1e-14 * (fabs(in) + fabs(out));
-    *t_in = max_d(b->t_in, in - slack);
-    *t_out = min_d(b->t_out, out + slack);
-    return in - slack <= out + slack && *t_in <= *t_out + slack;
+    box_span box = cell_box_clip(&t->boxes, x0, x1, y0, y1, h);
+    *t_in = max_d(b->t_in, box.in);
+    *t_out = min_d(b->t_out, box.out);
+    return box.in <= box.out && *t_in <= *t_out + box.slack;
+}
+
+/* For triangles without area in texture space, whose rectangles have no box: culled by height. */
+static bool clears_rectangle(const traversal *t, const bound *b)
+{
+    const ray_curve *c = t->walk.curve;
+    double pad = c->texel_rounding + c->texel_remainder;
+    knurl_range h = shell_height_range(t->walk.space, t->walk.lod, t->parameters->bounds, t->walk.frame,
+                                       min_d(b->x_in, b->x_out) - pad, min_d(b->y_in, b->y_out) - pad,
+                                       max_d(b->x_in, b->x_out) + pad, max_d(b->y_in, b->y_out) + pad);
+    return shell_curve_clears(&t->walk, b->in, b->out, h);
 }
 
 /* Line 15: the part of the bound between two inverted points (section 4.3). The inversion is along
@@ -153,13 +106,15 @@ static bound reduce(const ray_curve *c, const bound *b, double t_in, double t_ou
     return make_bound(c, in, out);
 }
 
-/* Line 16: halves the longer side of the rectangle, back half pushed first. */
-static void split(traversal *t, const bound *b)
+/* Line 16: halves the longer side of the rectangle, back half pushed first. False if it is as short as
+ * the parameter's last bits, so that no half would be shorter. */
+static bool split(traversal *t, const bound *b)
 {
     const ray_curve *c = t->walk.curve;
     bool along_x = fabs(b->x_out - b->x_in) >= fabs(b->y_out - b->y_in);
     double k = along_x ? 0.5 * (b->x_in + b->x_out) : 0.5 * (b->y_in + b->y_out);
     double middle = curve_cross(c, along_x ? &c->x : &c->y, k, b->in, b->out);
+    if (!(middle > min_d(b->in, b->out) && middle < max_d(b->in, b->out))) return false;
     curve_point at = curve_at(c, middle);
     double depth = curve_depth(c, middle);
     bound front = *b, back = *b;
@@ -169,26 +124,7 @@ static void split(traversal *t, const bound *b)
     front.t_out = back.t_in = depth;
     t->stack[t->top++] = back;
     t->stack[t->top++] = front;
-}
-
-/* Lines 4 and 5: turning points cut a stretch into pieces where x and y are monotone. */
-static int split_at_turns(const ray_curve *c, double in, double out, double cuts[6])
-{
-    double turns[4];
-    int count = curve_turning_points(c, &c->x, in, out, turns);
-    count += curve_turning_points(c, &c->y, in, out, turns + count);
-    double direction = out >= in ? 1.0 : -1.0;
-    for (int i = 1; i < count; i++)
-        for (int j = i; j > 0 && (turns[j] - turns[j - 1]) * direction < 0.0; j--) {
-            double swap = turns[j];
-            turns[j] = turns[j - 1];
-            turns[j - 1] = swap;
-        }
-    int n = 0;
-    cuts[n++] = in;
-    for (int i = 0; i < count; i++) cuts[n++] = turns[i];
-    cuts[n++] = out;
-    return n;
+    return true;
 }
 
 /* The while loop of Algorithm 1. */
@@ -207,26 +143,17 @@ static bool traverse(traversal *t)
             continue;
         }
         t->walk.steps++;
-        if (invertible) {
+        if (!invertible) {
+            if (clears_rectangle(t, &b)) continue;
+        } else {
             double t_in, t_out;
             if (!clip_to_box(t, &b, &t_in, &t_out)) continue;
             if (t_out < ray->tmin - slack || t_in > ray->tmax + slack) continue;
             if (t->parameters->inversion) b = reduce(c, &b, t_in, t_out);
         }
-        split(t, &b);
+        if (!split(t, &b) && shell_march(&t->walk, b.in, b.out)) return true;
     }
     return false;
-}
-
-/* Narrows a stretch to the ray's [tmin, tmax], a little wider than that; false if nothing is left. */
-static bool clip_to_ray(const ray_curve *c, const knurl_ray *ray, curve_interval *i)
-{
-    double slack = 1e-12 * (fabs(i->t_in) + fabs(i->t_out)) + 1e-9 * (i->t_out - i->t_in);
-    if (i->t_out < ray->tmin - slack || i->t_in > ray->tmax + slack) return false;
-    double in = i->in, out = i->out;
-    if (ray->tmin > i->t_in) i->in = curve_invert(c, in, out, ray->tmin - slack);
-    if (ray->tmax < i->t_out) i->out = curve_invert(c, in, out, ray->tmax + slack);
-    return true;
 }
 
 static bool rmip_intersect(const void *data, const method_query *q)
@@ -242,14 +169,15 @@ static bool rmip_intersect(const void *data, const method_query *q)
     t.parameters = parameters;
     t.walk =
         (shell_walk){.space = q->space, .lod = q->lod, .frame = q->frame, .curve = &curve, .ray = q->ray};
-    traversal_start(&t);
+    t.top = 0;
+    cell_boxes_make(q->frame, q->ray, &t.boxes);
     bool found = false;
     for (int i = 0; i < curve.interval_count && !found; i++) {
         curve_interval stretch = curve.intervals[i];
-        if (!clip_to_ray(&curve, q->ray, &stretch)) continue;
+        if (!curve_clip_to_ray(&curve, q->ray, &stretch)) continue;
         t.walk.stretch = &curve.intervals[i];
         double cuts[6];
-        int n = split_at_turns(&curve, stretch.in, stretch.out, cuts);
+        int n = curve_split_at_turns(&curve, stretch.in, stretch.out, cuts);
         for (int k = n - 2; k >= 0; k--) t.stack[t.top++] = make_bound(&curve, cuts[k], cuts[k + 1]);
         found = traverse(&t);
     }
