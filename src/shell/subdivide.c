@@ -129,19 +129,58 @@ static across across_at(const search *s, const height_patch *patch, double b1, d
     return out;
 }
 
-/* How far the derivatives over the piece differ from those at its centre: the largest difference at
- * the corners, with half as much again for what bends between them (within one bilinear piece h_a and
- * h_b are linear; only the normal's turn is not). */
-static double derivative_spread(const search *s, const piece *p, const height_patch *patch,
-                                const across *center)
+/* A piece seen along its longest and its shortest edge, which keep long, thin pieces well conditioned:
+ * its points are center + k1 edge 1 + k2 edge 2. */
+typedef struct piece_edges {
+    double b1, b2;         /* the centre */
+    double e1[2], e2[2];   /* (b1, b2) of the edges */
+    double a1, a2, c1, c2; /* derivatives across the ray at the centre, along edge 1 (a) and edge 2 (c) */
+    double r1, r2;         /* S - O across the ray at the centre */
+    double spread1, spread2;
+} piece_edges;
+
+static void along_edges(const piece_edges *e, const across *at, double out[4])
 {
-    double spread = 0.0;
-    for (int i = 0; i < 3; i++) {
-        across c = across_at(s, patch, p->b1[i], p->b2[i]);
-        spread = max_d(spread, max_d(max_d(fabs(c.a1 - center->a1), fabs(c.a2 - center->a2)),
-                                     max_d(fabs(c.c1 - center->c1), fabs(c.c2 - center->c2))));
+    out[0] = at->a1 * e->e1[0] + at->c1 * e->e1[1];
+    out[1] = at->a2 * e->e1[0] + at->c2 * e->e1[1];
+    out[2] = at->a1 * e->e2[0] + at->c1 * e->e2[1];
+    out[3] = at->a2 * e->e2[0] + at->c2 * e->e2[1];
+}
+
+/* The edges and the derivatives along them, with how far these differ over the piece from those at its
+ * centre: the largest difference at the corners, with half as much again for what bends between them
+ * (within one bilinear piece h_a and h_b are linear; only the normal's turn is not). */
+static piece_edges make_edges(const search *s, const piece *p, const height_patch *patch)
+{
+    piece_edges e = {.b1 = (p->b1[0] + p->b1[1] + p->b1[2]) / 3.0,
+                     .b2 = (p->b2[0] + p->b2[1] + p->b2[2]) / 3.0};
+    double length[3], d[4];
+    int longest = 0, shortest = 0;
+    for (int i = 0; i < 3; i++) { /* edge i is opposite to corner i */
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        length[i] = fabs(p->b1[j] - p->b1[k]) + fabs(p->b2[j] - p->b2[k]);
+        if (length[i] > length[longest]) longest = i;
+        if (length[i] <= length[shortest]) shortest = i;
     }
-    return 1.5 * spread;
+    if (shortest == longest) shortest = (longest + 1) % 3;
+    int common = 3 - longest - shortest; /* edge 1 ends at corner `shortest`, edge 2 at corner `longest` */
+    e.e1[0] = p->b1[shortest] - p->b1[common];
+    e.e1[1] = p->b2[shortest] - p->b2[common];
+    e.e2[0] = p->b1[longest] - p->b1[common];
+    e.e2[1] = p->b2[longest] - p->b2[common];
+    across center = across_at(s, patch, e.b1, e.b2);
+    along_edges(&e, &center, d);
+    e.a1 = d[0], e.a2 = d[1], e.c1 = d[2], e.c2 = d[3];
+    e.r1 = center.r1, e.r2 = center.r2;
+    for (int i = 0; i < 3; i++) {
+        across corner = across_at(s, patch, p->b1[i], p->b2[i]);
+        along_edges(&e, &corner, d);
+        e.spread1 = max_d(e.spread1, max_d(fabs(d[0] - e.a1), fabs(d[1] - e.a2)));
+        e.spread2 = max_d(e.spread2, max_d(fabs(d[2] - e.c1), fabs(d[3] - e.c2)));
+    }
+    e.spread1 *= 1.5;
+    e.spread2 *= 1.5;
+    return e;
 }
 
 /* What a piece can be on one bilinear patch. */
@@ -149,15 +188,17 @@ typedef enum verdict { EXCLUDED, AT_MOST_ONE, DIVIDE, TOO_SMALL } verdict;
 
 /* Range of w . (S - O) over the piece, w across the ray: the affine part at the corners plus the
  * spread of the derivatives. Whether it leaves out zero. */
-static bool excludes_zero(const piece *p, const across *c, double b1, double b2, double w1, double w2,
-                          double spread, double pad, double *width)
+static bool excludes_zero(const piece_edges *e, double w1, double w2, double pad, double *width)
 {
-    double value = w1 * c->r1 + w2 * c->r2, along1 = w1 * c->a1 + w2 * c->a2,
-           along2 = w1 * c->c1 + w2 * c->c2;
+    static const double corners[3][2] = {
+        {-1.0 / 3.0, -1.0 / 3.0}, {2.0 / 3.0, -1.0 / 3.0}, {-1.0 / 3.0, 2.0 / 3.0}};
+    double value = w1 * e->r1 + w2 * e->r2, along1 = w1 * e->a1 + w2 * e->a2,
+           along2 = w1 * e->c1 + w2 * e->c2;
     double most = 0.0;
     for (int i = 0; i < 3; i++) {
-        double d1 = p->b1[i] - b1, d2 = p->b2[i] - b2;
-        most = max_d(most, fabs(along1 * d1 + along2 * d2) + 2.0 * spread * (fabs(d1) + fabs(d2)));
+        double k1 = corners[i][0], k2 = corners[i][1];
+        most = max_d(most,
+                     fabs(along1 * k1 + along2 * k2) + 2.0 * (e->spread1 * fabs(k1) + e->spread2 * fabs(k2)));
     }
     *width = most;
     return fabs(value) > most + pad;
@@ -178,20 +219,20 @@ static void major_axis(double c, double s, double *w1, double *w2)
 /* Near a tangency the surface seen along the ray is thin in one direction: the left singular vector of
  * the smaller singular value of the derivative. Testing along it keeps the number of pieces bounded,
  * where boxes alone would need ever more of them. */
-static verdict judge(const search *s, const piece *p, const height_patch *patch, const across *c, double b1,
-                     double b2)
+static verdict judge(const search *s, const piece *p, const piece_edges *e)
 {
-    double spread = derivative_spread(s, p, patch, c);
-    double xx = c->a1 * c->a1 + c->c1 * c->c1, yy = c->a2 * c->a2 + c->c2 * c->c2,
-           xy = c->a1 * c->a2 + c->c1 * c->c2;
+    double xx = e->a1 * e->a1 + e->c1 * e->c1, yy = e->a2 * e->a2 + e->c2 * e->c2,
+           xy = e->a1 * e->a2 + e->c1 * e->c2;
     double w1, w2;
     major_axis(xx - yy, 2.0 * xy, &w1, &w2);
     double thin, wide;
-    if (excludes_zero(p, c, b1, b2, -w2, w1, spread, s->pad, &thin)) return EXCLUDED;
-    if (excludes_zero(p, c, b1, b2, w1, w2, spread, s->pad, &wide)) return EXCLUDED;
-    double det = c->a1 * c->c2 - c->a2 * c->c1;
-    double sum = fabs(c->a1) + fabs(c->a2) + fabs(c->c1) + fabs(c->c2);
-    if (spread * sum < 0.25 * fabs(det)) return AT_MOST_ONE;
+    if (excludes_zero(e, -w2, w1, s->pad, &thin)) return EXCLUDED;
+    if (excludes_zero(e, w1, w2, s->pad, &wide)) return EXCLUDED;
+    /* Any derivative within the spread keeps the sign of the determinant: injective on the piece. */
+    double det = e->a1 * e->c2 - e->a2 * e->c1;
+    double change = e->spread1 * (fabs(e->c1) + fabs(e->c2)) + e->spread2 * (fabs(e->a1) + fabs(e->a2)) +
+                    2.0 * e->spread1 * e->spread2;
+    if (2.0 * change < fabs(det)) return AT_MOST_ONE;
     return !(thin >= s->pad) || p->depth >= SUBDIVIDE_DEPTH ? TOO_SMALL : DIVIDE;
 }
 
@@ -249,9 +290,9 @@ static bool keep_root(search *s, const height_patch *patch, const across *at, do
 /* Tries one patch on a piece. Returns false if the piece must be divided further. */
 static bool try_patch(search *s, const piece *p, const height_patch *patch, const extent *cell)
 {
-    double b1 = (p->b1[0] + p->b1[1] + p->b1[2]) / 3.0, b2 = (p->b2[0] + p->b2[1] + p->b2[2]) / 3.0;
-    across center = across_at(s, patch, b1, b2);
-    verdict found = judge(s, p, patch, &center, b1, b2);
+    piece_edges edges = make_edges(s, p, patch);
+    verdict found = judge(s, p, &edges);
+    double b1 = edges.b1, b2 = edges.b2;
     if (found == EXCLUDED) return true;
     if (found == DIVIDE) return false;
     across at;
