@@ -219,28 +219,27 @@ static double barycentric(const curve_point *at, int side)
     return side == 0 ? 1.0 - at->b1 - at->b2 : side == 1 ? at->b1 : at->b2;
 }
 
-/* Which side an end of a stretch lies on, by the barycentric that is nearest to zero there. */
-static int nearest_side(const curve_point *at)
-{
-    int side = 0;
-    for (int i = 1; i < 3; i++)
-        if (fabs(barycentric(at, i)) < fabs(barycentric(at, side))) side = i;
-    return side;
-}
-
-/* The side at parameter p, if there is one, and how its barycentric changes along the curve. `inwards`
- * is a short step into the stretch. */
+/* The side of the prism at an end of a stretch, if there is one, and how its barycentric changes along
+ * the curve. */
 typedef struct side_end {
     int side; /* -1: an end of the height range */
     double value, slope;
 } side_end;
 
+/* Of the barycentrics that grow inwards, the one that is last to reach zero ends the stretch. The nearest
+ * to zero will not do: by a vertex two are. `inwards` is a short step into the stretch. */
 static side_end find_side(const ray_curve *c, double p, double inwards)
 {
     curve_point at = curve_at(c, p), inside = curve_at(c, p + inwards);
-    int side = nearest_side(&at);
-    double value = barycentric(&at, side), slope = (barycentric(&inside, side) - value) / inwards;
-    return (side_end){fabs(value) > 1e-5 || slope == 0.0 ? -1 : side, value, slope};
+    side_end end = {-1, 0.0, 0.0};
+    double latest = -INFINITY;
+    for (int i = 0; i < 3; i++) {
+        double value = barycentric(&at, i), growth = barycentric(&inside, i) - value;
+        if (!(growth > 0.0) || !(fabs(value) <= 1e-5) || !(-value / growth > latest)) continue;
+        latest = -value / growth;
+        end = (side_end){i, value, growth / inwards};
+    }
+    return end;
 }
 
 static const double SHORT_STEP = 1e-3; /* of a stretch */
@@ -252,18 +251,21 @@ double curve_end_zone(const ray_curve *c, const curve_interval *s, bool first)
     side_end end = find_side(c, first ? s->in : s->out, inwards);
     return end.side < 0
                ? 0.0
-               : copysign(min_d(2.0 * c->barycentric_rounding / fabs(end.slope), fabs(inwards)), inwards);
+               : copysign(min_d(2.0 * c->barycentric_rounding / fabs(end.slope), fabs(s->out - s->in)),
+                          inwards);
 }
 
 /* Moves an end that lies on a side to where the curve's points (not only the quadratics) pass it by the
- * rounding of b. */
+ * rounding of b. Not by more than the stretch: near a vertex that is no longer than the allowance by which
+ * the search was wide, an end may move over most of it. */
 static double settle_end(const ray_curve *c, double p, double inwards)
 {
+    double length = fabs(inwards) / SHORT_STEP;
     if (inwards == 0.0) return p;
     side_end end = find_side(c, p, inwards);
     for (int i = 0; end.side >= 0 && i < 3; i++) {
         double step = (end.value + c->barycentric_rounding) / end.slope;
-        if (!(fabs(step) <= fabs(inwards))) break;
+        if (!(fabs(step) <= length)) break;
         p -= step;
         curve_point at = curve_at(c, p);
         end.value = barycentric(&at, end.side);

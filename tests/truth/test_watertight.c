@@ -165,8 +165,8 @@ static void nothing_leaks_out(void **state)
 
 typedef enum parity { PARITY_EVEN, PARITY_EXPLAINED, PARITY_WRONG } parity;
 
-/* Whether at a hit that the oracle does not have the ray passes the surface within rounding, at a small
- * angle. */
+/* Whether at a hit that the oracle does not have the ray passes the surface within rounding: at a small
+ * angle, or by an edge of the base, which may be a crease that the ray passes on the outside. */
 static bool touches(const torus *t, const oracle_ray *ray, const knurl_hit *hit, const oracle_root *roots,
                     int count)
 {
@@ -179,7 +179,8 @@ static bool touches(const torus *t, const oracle_ray *ray, const knurl_hit *hit,
     for (int i = 0; i < count; i++) {
         if (fabs(roots[i].t - hit->t) * sqrt(length) <= rounding) return false;
     }
-    return cosine < 1e-3 && oracle_gap(t->o, ray, hit->triangle, hit->a, hit->b) <= rounding;
+    double least = fmin(1.0 - hit->a - hit->b, fmin(hit->a, hit->b));
+    return (cosine < 1e-3 || fabs(least) < 1e-8) && oracle_gap(t->o, ray, hit->triangle, hit->a, hit->b) <= rounding;
 }
 
 /* Whether the oracle knows a reason: a root that rounding decides, or two closer than the step, or a hit
