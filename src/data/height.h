@@ -52,6 +52,7 @@ static inline int32_t height_wrap(int64_t i, int32_t size, knurl_wrap wrap)
 {
     if (i >= 0 && i < size) return (int32_t)i;
     if (wrap == KNURL_WRAP_CLAMP) return i < 0 ? 0 : size - 1;
+    if (wrap == KNURL_WRAP_REPEAT && i >= size && i < 2 * (int64_t)size) return (int32_t)(i - size);
     int64_t period = wrap == KNURL_WRAP_MIRROR ? 2 * (int64_t)size : size;
     int64_t r = i % period;
     if (r < 0) r += period;

@@ -1,5 +1,6 @@
 /* The explicit ray curve; see curve.h. */
 #include "shell/curve.h"
+#include "shell/invert.h"
 
 /* A ray whose sine against the offset plane it starts in is under this is followed by depth.
  * By height, rounding is amplified by 1 / sine: to 1e-11 here. By depth, the quadratics leave a
@@ -87,47 +88,6 @@ static bool may_graze(const ray_curve *c, const triangle_frame *f, double thresh
     return lowest <= threshold && highest >= -threshold;
 }
 
-/* Solves columns [a b c] x = r by Cramer's rule; false if singular. */
-static bool solve3(vec3 a, vec3 b, vec3 c, vec3 r, vec3 *x)
-{
-    vec3 bc = v3_cross(b, c);
-    double det = v3_dot(a, bc);
-    if (!(fabs(det) > 1e-14 * v3_length(a) * v3_length(bc)) || !isfinite(det)) return false;
-    double inverse = 1.0 / det;
-    *x =
-        v3(v3_dot(r, bc) * inverse, v3_dot(a, v3_cross(r, c)) * inverse, v3_dot(a, v3_cross(b, r)) * inverse);
-    return true;
-}
-
-static vec3 shell_point(const triangle_frame *f, vec3 q)
-{
-    vec3 base = v3_mad(v3_scale(f->pe, q.x), q.y, f->pf);
-    return v3_mad(base, q.z, v3_mad(v3_mad(f->n[0], q.x, f->ne), q.y, f->nf));
-}
-
-static void shell_columns(const triangle_frame *f, vec3 q, vec3 *ja, vec3 *jb, vec3 *js)
-{
-    *ja = v3_mad(f->pe, q.z, f->ne);
-    *jb = v3_mad(f->pf, q.z, f->nf);
-    *js = v3_mad(v3_mad(f->n[0], q.x, f->ne), q.y, f->nf);
-}
-
-/* Inverts F(b1, b2, s) = point by Newton's method from *q. The point is relative to vertex 0. */
-static bool invert_point(const triangle_frame *f, vec3 point, vec3 *q)
-{
-    for (int i = 0; i < 20; i++) {
-        vec3 ja, jb, js, step;
-        shell_columns(f, *q, &ja, &jb, &js);
-        if (!solve3(ja, jb, js, v3_sub(point, shell_point(f, *q)), &step)) return false;
-        *q = v3_add(*q, step);
-        if (!v3_finite(*q)) return false;
-        double change = fabs(step.x) + fabs(step.y) + fabs(step.z) / (f->size + fabs(q->z));
-        if (change < 1e-15 * (1.0 + fabs(q->x) + fabs(q->y))) return true;
-        if (i >= 6 && change < 1e-12) return true;
-    }
-    return false;
-}
-
 /* Curve by depth, around the ray's point at depth `center`, with `start` near its inverse: value, tangent J
  * c' = D and bend J c'' = -2 s' (N_x x' + N_y y'). */
 static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_ray *ray, double center,
@@ -135,7 +95,7 @@ static bool depth_curve(const triangle_frame *f, const ray_view *v, const knurl_
 {
     vec3 relative = v3_sub(v3_load(ray->origin), f->base);
     vec3 q = start, ja, jb, js, tangent, bend;
-    if (!invert_point(f, v3_mad(relative, center, v->along), &q)) return false;
+    if (!shell_invert(f, v3_mad(relative, center, v->along), &q)) return false;
     shell_columns(f, q, &ja, &jb, &js);
     if (!solve3(ja, jb, js, v->along, &tangent)) return false;
     vec3 turn = v3_scale(v3_mad(v3_scale(f->ne, tangent.x), tangent.y, f->nf), -2.0 * tangent.z);
@@ -162,20 +122,6 @@ static void set_inversion_rounding(const triangle_frame *f, const ray_view *v, v
     double across = v3_length(v3_cross(jb, js)) + v3_length(v3_cross(ja, js));
     c->barycentric_rounding = error * across + 16.0 * DBL_EPSILON;
     c->height_rounding = error * v3_length(v3_cross(ja, jb));
-}
-
-curve_point curve_at_refined(const ray_curve *c, double p)
-{
-    const triangle_frame *f = c->frame;
-    double inverse = c->by_depth ? 1.0 : 1.0 / quadratic_at(&c->w, p);
-    vec3 q = v3(quadratic_at(&c->b1, p) * inverse, quadratic_at(&c->b2, p) * inverse,
-                c->by_depth ? quadratic_at(&c->s, p) : p);
-    vec3 ja, jb, js, step;
-    shell_columns(f, q, &ja, &jb, &js);
-    vec3 point = v3_mad(c->origin, curve_depth(c, p), c->direction);
-    if (solve3(ja, jb, js, v3_sub(point, shell_point(f, q)), &step)) q = v3_add(q, step);
-    return (curve_point){q.x, q.y, q.z, f->x[0] + q.x * f->xe + q.y * f->xf,
-                         f->y[0] + q.x * f->ye + q.y * f->yf};
 }
 
 /* One condition on the parameter: value(p) >= -allowance. */
@@ -539,88 +485,4 @@ void ray_curve_make(const triangle_frame *f, const knurl_ray *ray, ray_curve *c)
         sort_intervals(c);
     }
     make_texel_coordinates(f, c);
-}
-
-double curve_invert(const ray_curve *c, double in, double out, double t)
-{
-    if (c->by_depth) {
-        double p = (t - c->depth_origin) / c->depth_scale;
-        return p < in ? in : p > out ? out : p;
-    }
-    double t_in = curve_depth(c, in), t_out = curve_depth(c, out);
-    if (!(t > t_in)) return in;
-    if (!(t < t_out)) return out;
-    double a = in, b = out, p = in + (out - in) * ((t - t_in) / (t_out - t_in));
-    for (int i = 0; i < 60; i++) {
-        double value = curve_depth(c, p) - t;
-        if (value > 0.0)
-            b = p;
-        else
-            a = p;
-        /* Secant through the bracket's fresh end, bisection every third step. */
-        double ta = curve_depth(c, a) - t, tb = curve_depth(c, b) - t;
-        double next = i % 3 == 2 || !(tb > ta) ? 0.5 * (a + b) : a + (b - a) * (-ta / (tb - ta));
-        if (fabs(next - p) <= 1e-12 * fabs(out - in)) return next;
-        p = next;
-    }
-    return p;
-}
-
-static double cross_quadratic(const ray_curve *c, const quadratic *coordinate, double k, double a, double b)
-{
-    quadratic q = {{coordinate->c[0] - k * c->w.c[0], coordinate->c[1] - k * c->w.c[1],
-                    coordinate->c[2] - k * c->w.c[2]}};
-    double lo = min_d(a, b), hi = max_d(a, b), roots[2];
-    int count = quadratic_roots(&q, roots);
-    double best = NAN, outside = INFINITY;
-    for (int i = 0; i < count; i++) {
-        double away = roots[i] < lo ? lo - roots[i] : roots[i] > hi ? roots[i] - hi : 0.0;
-        if (away < outside) {
-            outside = away;
-            best = roots[i];
-        }
-    }
-    if (outside <= 1e-9 * (hi - lo)) return best < lo ? lo : best > hi ? hi : best;
-    /* Rounding hid the root: bisect on the sign, which the caller's monotone stretch guarantees. */
-    bool rising = quadratic_at(&q, a) < 0.0;
-    for (int i = 0; i < 60; i++) {
-        double middle = 0.5 * (a + b);
-        if ((quadratic_at(&q, middle) < 0.0) == rising)
-            a = middle;
-        else
-            b = middle;
-    }
-    return 0.5 * (a + b);
-}
-
-double curve_cross(const ray_curve *c, const quadratic *coordinate, double k, double a, double b)
-{
-    double p = cross_quadratic(c, coordinate, k, a, b);
-    for (int i = 0; c->refine && i < 2; i++) {
-        curve_point at = curve_at(c, p);
-        double w = quadratic_at(&c->w, p), value = (coordinate == &c->x ? at.x : at.y) - k;
-        double slope = (quadratic_slope(coordinate, p) - k * quadratic_slope(&c->w, p)) / w;
-        double moved = p - value / slope;
-        if (!(moved >= min_d(a, b) && moved <= max_d(a, b))) break;
-        p = moved;
-    }
-    return p;
-}
-
-int curve_turning_points(const ray_curve *c, const quadratic *coordinate, double a, double b,
-                         double turning[2])
-{
-    const double *x = coordinate->c, *w = c->w.c;
-    quadratic slope = {
-        {x[1] * w[0] - x[0] * w[1], 2.0 * (x[2] * w[0] - x[0] * w[2]), x[2] * w[1] - x[1] * w[2]}};
-    double roots[2], lo = min_d(a, b), hi = max_d(a, b);
-    int found = quadratic_roots(&slope, roots), count = 0;
-    for (int i = 0; i < found; i++)
-        if (roots[i] > lo && roots[i] < hi) turning[count++] = roots[i];
-    if (count == 2 && (turning[0] > turning[1]) != (a > b)) {
-        double first = turning[0];
-        turning[0] = turning[1];
-        turning[1] = first;
-    }
-    return count;
 }

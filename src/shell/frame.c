@@ -21,6 +21,16 @@ void height_lod_make(const shell_space *space, double lod, height_lod *out)
     out->lod = lod;
 }
 
+/* An origin that reads the same texels, in the first period: most cells of a small triangle then need no
+ * wrapping of their own. */
+static int64_t wrap_origin(int64_t origin, int32_t size, knurl_wrap wrap)
+{
+    int64_t period = wrap == KNURL_WRAP_MIRROR ? 2 * (int64_t)size : size;
+    if (wrap == KNURL_WRAP_CLAMP || (origin >= 0 && origin < period)) return origin;
+    int64_t rest = origin % period;
+    return rest < 0 ? rest + period : rest;
+}
+
 /* Texel coordinates of the vertices, relative to the integer texel below their centre. Multiples of
  * the level's size are taken off first, so that the subtraction is of nearby numbers. */
 static void load_texels(const shell_space *space, const uint32_t *v, const height_lod *lod, triangle_frame *f)
@@ -33,6 +43,8 @@ static void load_texels(const shell_space *space, const uint32_t *v, const heigh
     }
     f->origin_x = (int64_t)floor_d((uv[0].x + uv[1].x + uv[2].x) / 3.0 * w - 0.5);
     f->origin_y = (int64_t)floor_d((uv[0].y + uv[1].y + uv[2].y) / 3.0 * h - 0.5);
+    f->wrapped_x = wrap_origin(f->origin_x, lod->level[0]->width, space->wrap_u);
+    f->wrapped_y = wrap_origin(f->origin_y, lod->level[0]->height, space->wrap_v);
     f->texel_rounding = 0.0;
     for (int i = 0; i < 3; i++) {
         f->x[i] = (uv[i].x * w - 0.5) - (double)f->origin_x;
@@ -92,10 +104,9 @@ void triangle_frame_load(const shell_space *space, uint32_t triangle, const heig
     f->inverse_uv[3] = f->xe * inverse;
 }
 
-/* Adds weight * (bilinear cell (i, j) of `level`) to the patch; (px, py) is the position of the
- * patch's corner in the cell, (rx, ry) the cell's texels per texel of the patch. */
-static void add_cell(const shell_space *space, const height_level *level, int64_t i, int64_t j, double px,
-                     double py, double rx, double ry, double weight, height_patch *patch)
+/* The four heights of cell (i, j), each times `weight`: (0,0), (1,0), (0,1), (1,1). */
+static void load_corners(const shell_space *space, const height_level *level, int64_t i, int64_t j,
+                         double weight, double h[4])
 {
     int32_t columns[2] = {height_wrap(i, level->width, space->wrap_u),
                           height_wrap(i + 1, level->width, space->wrap_u)};
@@ -104,27 +115,51 @@ static void add_cell(const shell_space *space, const height_level *level, int64_
     double raw[4];
     double k = space->factor * weight * height_fetch_cell(level, columns, rows, raw),
            o = space->offset * weight;
-    double h00 = o + k * raw[0], h10 = o + k * raw[1], h01 = o + k * raw[2], h11 = o + k * raw[3];
-    double ax = h10 - h00, ay = h01 - h00, axy = (h11 - h01) - ax;
-    patch->c += h00 + ax * px + py * (ay + axy * px);
-    patch->cx += (ax + axy * py) * rx;
-    patch->cy += (ay + axy * px) * ry;
-    patch->cxy += axy * rx * ry;
-    patch->min += min_d(min_d(h00, h10), min_d(h01, h11));
-    patch->max += max_d(max_d(h00, h10), max_d(h01, h11));
-    patch->slope += (max_d(fabs(ax), fabs(ax + axy)) * rx + max_d(fabs(ay), fabs(ay + axy)) * ry);
+    for (int c = 0; c < 4; c++) h[c] = o + k * raw[c];
+}
+
+/* The patch of one cell, whose corner is the patch's. */
+static void set_patch(const double h[4], height_patch *patch)
+{
+    double ax = h[1] - h[0], ay = h[2] - h[0], axy = (h[3] - h[2]) - ax;
+    patch->c = h[0];
+    patch->cx = ax;
+    patch->cy = ay;
+    patch->cxy = axy;
+    patch->min = min_d(min_d(h[0], h[1]), min_d(h[2], h[3]));
+    patch->max = max_d(max_d(h[0], h[1]), max_d(h[2], h[3]));
+    patch->slope = max_d(fabs(ax), fabs(ax + axy)) + max_d(fabs(ay), fabs(ay + axy));
+}
+
+/* Adds a cell of another level: (px, py) is the position of the patch's corner in the cell, (rx, ry) the
+ * cell's texels per texel of the patch. */
+static void add_patch(const double h[4], double px, double py, double rx, double ry, height_patch *patch)
+{
+    height_patch other;
+    set_patch(h, &other);
+    patch->c += other.c + other.cx * px + py * (other.cy + other.cxy * px);
+    patch->cx += (other.cx + other.cxy * py) * rx;
+    patch->cy += (other.cy + other.cxy * px) * ry;
+    patch->cxy += other.cxy * rx * ry;
+    patch->min += other.min;
+    patch->max += other.max;
+    patch->slope += max_d(fabs(other.cx), fabs(other.cx + other.cxy)) * rx +
+                    max_d(fabs(other.cy), fabs(other.cy + other.cxy)) * ry;
 }
 
 void height_patch_load(const shell_space *space, const height_lod *lod, const triangle_frame *frame,
                        int64_t i, int64_t j, int64_t i1, int64_t j1, height_patch *patch)
 {
-    *patch = (height_patch){.x = (double)i, .y = (double)j};
-    int64_t absolute_x = frame->origin_x + i, absolute_y = frame->origin_y + j;
-    add_cell(space, lod->level[0], absolute_x, absolute_y, 0.0, 0.0, 1.0, 1.0, 1.0 - lod->blend, patch);
+    double h[4];
+    load_corners(space, lod->level[0], frame->wrapped_x + i, frame->wrapped_y + j, 1.0 - lod->blend, h);
+    patch->x = (double)i;
+    patch->y = (double)j;
+    set_patch(h, patch);
     if (lod->blend > 0.0) {
-        double px = ((double)absolute_x + 0.5) * lod->ratio[0] - 0.5 - (double)i1;
-        double py = ((double)absolute_y + 0.5) * lod->ratio[1] - 0.5 - (double)j1;
-        add_cell(space, lod->level[1], i1, j1, px, py, lod->ratio[0], lod->ratio[1], lod->blend, patch);
+        double px = ((double)(frame->origin_x + i) + 0.5) * lod->ratio[0] - 0.5 - (double)i1;
+        double py = ((double)(frame->origin_y + j) + 0.5) * lod->ratio[1] - 0.5 - (double)j1;
+        load_corners(space, lod->level[1], i1, j1, lod->blend, h);
+        add_patch(h, px, py, lod->ratio[0], lod->ratio[1], patch);
     }
     double rounding = 16.0 * DBL_EPSILON * (fabs(patch->min) + fabs(patch->max));
     patch->min -= rounding;

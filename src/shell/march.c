@@ -208,6 +208,7 @@ typedef struct march_state {
     double cell[4];
     int families;
     double normal[2];
+    double rounding; /* the part of g's that is the same for all texels */
     double in, out;
     double carried; /* g at the current parameter, if have_carried */
     bool have_carried;
@@ -223,8 +224,8 @@ static bool clears(const ray_curve *c, const double normal[2], double a, double 
     return z0 > max || z1 < min;
 }
 
-/* Bound on the error of g where |h| <= `height` and |h_x| + |h_y| <= `slope`. */
-static double g_rounding(const shell_walk *walk, double slope, double height)
+/* Bound on the error of g, without what depends on the texel. */
+static double fixed_rounding(const shell_walk *walk)
 {
     const triangle_frame *f = walk->frame;
     double s = max_d(fabs(f->s0), fabs(f->s1));
@@ -232,8 +233,13 @@ static double g_rounding(const shell_walk *walk, double slope, double height)
                                      : walk->curve->barycentric_rounding * s *
                                            (fabs(f->ne.x) + fabs(f->ne.y) + fabs(f->ne.z) + fabs(f->nf.x) +
                                             fabs(f->nf.y) + fabs(f->nf.z));
-    return slope * walk->curve->texel_rounding + normals + walk->curve->height_rounding +
-           32.0 * DBL_EPSILON * (s + height);
+    return normals + walk->curve->height_rounding + 32.0 * DBL_EPSILON * s;
+}
+
+/* What is added where |h| <= `height` and |h_x| + |h_y| <= `slope`. */
+static double texel_rounding(const shell_walk *walk, double slope, double height)
+{
+    return slope * walk->curve->texel_rounding + 32.0 * DBL_EPSILON * height;
 }
 
 /* Whether the surface touches the ray at an end of the march within rounding, where what comes next may
@@ -255,7 +261,8 @@ static bool visit(march_state *m, double a, double b)
     height_patch_load(m->walk->space, m->walk->lod, m->walk->frame, (int64_t)m->cell[0], (int64_t)m->cell[1],
                       m->families > 2 ? (int64_t)m->cell[2] : 0, m->families > 2 ? (int64_t)m->cell[3] : 0,
                       &f.patch);
-    f.rounding = g_rounding(m->walk, f.patch.slope, max_d(fabs(f.patch.min), fabs(f.patch.max)));
+    f.rounding =
+        m->rounding + texel_rounding(m->walk, f.patch.slope, max_d(fabs(f.patch.min), fabs(f.patch.max)));
     m->walk->steps++;
     if (clears(m->walk->curve, m->normal, a, b, f.patch.min - 2.0 * f.rounding,
                f.patch.max + 2.0 * f.rounding)) {
@@ -289,6 +296,7 @@ static void start_march(march_state *m, shell_walk *walk, double in, double out)
         m->cell[3] = start_family(&m->lines[3], c, &c->y, ry, oy, first.y, last.y, in, out);
     }
     normal_range(walk, &first, &last, m->normal);
+    m->rounding = fixed_rounding(walk);
 }
 
 bool shell_march(shell_walk *walk, double in, double out)
@@ -320,6 +328,7 @@ bool shell_curve_clears(const shell_walk *walk, double in, double out, knurl_ran
     curve_point first = curve_at(walk->curve, in), last = curve_at(walk->curve, out);
     double normal[2];
     normal_range(walk, &first, &last, normal);
-    double pad = 2.0 * g_rounding(walk, h.max - h.min, max_d(fabs(h.min), fabs(h.max)));
+    double pad =
+        2.0 * (fixed_rounding(walk) + texel_rounding(walk, h.max - h.min, max_d(fabs(h.min), fabs(h.max))));
     return clears(walk->curve, normal, in, out, h.min - pad, h.max + pad);
 }

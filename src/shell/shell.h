@@ -65,10 +65,11 @@ typedef struct triangle_frame {
     double x[3], y[3];     /* texel coordinates */
     double xe, xf, ye, yf; /* their edges */
     int64_t origin_x, origin_y;
-    double texel_rounding; /* bound on the rounding of x, y */
-    double size;           /* largest |p| component, a length scale */
-    double s0, s1;         /* range of the unnormalised height, padded outwards */
-    double inverse_uv[4];  /* (b1, b2) = M (x - x[0], y - y[0]); zeros when SHELL_FLAT_UV */
+    int64_t wrapped_x, wrapped_y; /* reads the same texels as the origin, from the first tile */
+    double texel_rounding;        /* bound on the rounding of x, y */
+    double size;                  /* largest |p| component, a length scale */
+    double s0, s1;                /* range of the unnormalised height, padded outwards */
+    double inverse_uv[4];         /* (b1, b2) = M (x - x[0], y - y[0]); zeros when SHELL_FLAT_UV */
     uint32_t flags;
     bool unnormalised;
 } triangle_frame;
