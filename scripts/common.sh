@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Sourced by the other scripts: strict mode, the repository's root, and one way to build.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

@@ -5,5 +5,5 @@
 . "$(dirname "$0")/common.sh"
 scripts/setup.sh
 # shellcheck disable=SC2086 # the options are words
-build_tree build -DCMAKE_BUILD_TYPE=Release ${KNURL_CMAKE_OPTIONS:-}
+build_tree build -DCMAKE_BUILD_TYPE=Release -DKNURL_TESTS=ON ${KNURL_CMAKE_OPTIONS:-}
 exec ctest --test-dir build --output-on-failure --no-tests=error -j "$jobs" "$@"

@@ -10,13 +10,13 @@
 extern "C" {
 #endif
 
-#define KNURL_VERSION_MAJOR 0
-#define KNURL_VERSION_MINOR 1
-#define KNURL_VERSION_PATCH 0
+#define KNURL_VERSION_MAJOR  0
+#define KNURL_VERSION_MINOR  1
+#define KNURL_VERSION_PATCH  0
 #define KNURL_VERSION_STRING "0.1.0"
 
 #if defined(__GNUC__)
-#define KNURL_API __attribute__((visibility("default")))
+#define KNURL_API                         __attribute__((visibility("default")))
 #define KNURL_PRINTF(format_index, first) __attribute__((format(printf, format_index, first)))
 #else
 #define KNURL_API
@@ -45,11 +45,7 @@ typedef struct knurl_error {
     char message[1024];
 } knurl_error;
 
-typedef enum knurl_log_level {
-    KNURL_LOG_DEBUG = 0,
-    KNURL_LOG_INFO,
-    KNURL_LOG_WARNING
-} knurl_log_level;
+typedef enum knurl_log_level { KNURL_LOG_DEBUG = 0, KNURL_LOG_INFO, KNURL_LOG_WARNING } knurl_log_level;
 
 /* Called for warnings and notes. May be called from several threads at once.
  * `message` has no newline and is valid during the call only. */
@@ -64,8 +60,7 @@ typedef bool knurl_progress_fn(void *user, const char *stage, double fraction);
  * p NULL allocates, new_size 0 frees, else resizes and keeps the contents. Returns NULL when
  * out of memory (the old block then stays). Called from several threads at once.
  * `alignment` is a power of two, at most 64. */
-typedef void *knurl_reallocate_fn(void *user, void *p, size_t old_size, size_t new_size,
-                                  size_t alignment);
+typedef void *knurl_reallocate_fn(void *user, void *p, size_t old_size, size_t new_size, size_t alignment);
 
 /* How a context is made. Fill it with knurl_context_def_default(). */
 typedef struct knurl_context_def {
@@ -73,12 +68,12 @@ typedef struct knurl_context_def {
     int32_t threads;                 /* worker threads, 0: one per core; at most 1024 */
     knurl_reallocate_fn *reallocate; /* NULL: aligned C library allocation */
     void *allocator_user;
-    knurl_log_fn *log;               /* NULL: silent */
+    knurl_log_fn *log; /* NULL: silent */
     void *log_user;
-    uint64_t memory_limit;           /* bytes that all objects may hold together, 0: no limit */
-    uint64_t max_image_pixels;       /* refuse larger images, default 2^32 (65,536 squared) */
-    uint64_t max_file_bytes;         /* refuse larger input files, default 16 GiB */
-    uint32_t cpu_mask;               /* KNURL_CPU_* features that may be used, default all */
+    uint64_t memory_limit;     /* bytes that all objects may hold together, 0: no limit */
+    uint64_t max_image_pixels; /* refuse larger images, default 2^32 (65,536 squared) */
+    uint64_t max_file_bytes;   /* refuse larger input files, default 16 GiB */
+    uint32_t cpu_mask;         /* KNURL_CPU_* features that may be used, default all */
 } knurl_context_def;
 
 enum { KNURL_CPU_SSE41 = 1u << 0, KNURL_CPU_AVX2 = 1u << 1, KNURL_CPU_AVX512 = 1u << 2 };

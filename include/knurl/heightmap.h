@@ -34,8 +34,7 @@ KNURL_API knurl_heightmap_def knurl_heightmap_def_default(void);
 
 /* Builds in parallel on the context's threads. Texels must be finite: a NaN or an infinity
  * is KNURL_ERROR_INPUT with its place. */
-KNURL_API knurl_status knurl_heightmap_create(knurl_context *context,
-                                              const knurl_heightmap_def *def,
+KNURL_API knurl_status knurl_heightmap_create(knurl_context *context, const knurl_heightmap_def *def,
                                               knurl_heightmap **map, knurl_error *error);
 KNURL_API void knurl_heightmap_release(knurl_heightmap *map);
 KNURL_API knurl_heightmap *knurl_heightmap_retain(knurl_heightmap *map);
@@ -47,12 +46,11 @@ KNURL_API int32_t knurl_heightmap_levels(const knurl_heightmap *map); /* at leas
 /* Sample (x, y) of a level, x in [0, width), y in [0, height). Level k + 1 is the area-weighted
  * box filter of level k at max(1, size / 2) samples per axis; levels above 0 of integer maps are
  * rounded to 16 bits, of float maps to float. */
-KNURL_API double knurl_heightmap_sample(const knurl_heightmap *map, int32_t level, int32_t x,
-                                        int32_t y);
+KNURL_API double knurl_heightmap_sample(const knurl_heightmap *map, int32_t level, int32_t x, int32_t y);
 /* The reconstruction at (u, v), v = 0 at the first row; lod in [0, levels - 1], fractional
  * values blend two levels linearly. Any u, v of magnitude under 2^20. */
-KNURL_API double knurl_heightmap_value(const knurl_heightmap *map, double u, double v,
-                                       knurl_wrap wrap_u, knurl_wrap wrap_v, double lod);
+KNURL_API double knurl_heightmap_value(const knurl_heightmap *map, double u, double v, knurl_wrap wrap_u,
+                                       knurl_wrap wrap_v, double lod);
 
 typedef struct knurl_range {
     double min, max;
@@ -65,9 +63,9 @@ typedef enum knurl_bounds_kind {
 
 /* Conservative range of the reconstruction over the closed rectangle [u0, u1] x [v0, v1],
  * u0 <= u1, v0 <= v1, wrapped, at any lod (bounds hold for the blend). */
-KNURL_API knurl_range knurl_heightmap_bounds(const knurl_heightmap *map, knurl_bounds_kind kind,
-                                             double u0, double v0, double u1, double v1,
-                                             knurl_wrap wrap_u, knurl_wrap wrap_v, double lod);
+KNURL_API knurl_range knurl_heightmap_bounds(const knurl_heightmap *map, knurl_bounds_kind kind, double u0,
+                                             double v0, double u1, double v1, knurl_wrap wrap_u,
+                                             knurl_wrap wrap_v, double lod);
 /* Range of all samples. */
 KNURL_API knurl_range knurl_heightmap_range(const knurl_heightmap *map);
 

@@ -56,10 +56,12 @@ knurl_status knurl_file_read(knurl_context *context, const char *path, unsigned 
                              knurl_error *error);
 
 /* A file that appears under its name only when it is complete: write to knurl_output.path (a
- * temporary name beside the target), then knurl_output_commit, or knurl_output_discard. */
+ * temporary name beside the target), then knurl_output_commit, or knurl_output_discard. Devices and
+ * pipes are not replaced: their path is their own name. */
 typedef struct knurl_output {
-    char path[4096]; /* write here */
-    char target[4096];
+    char path[4096];   /* write here */
+    char target[4096]; /* links resolved */
+    bool in_place;     /* not a regular file: nothing to rename or to remove */
 } knurl_output;
 knurl_status knurl_output_open(const char *target, knurl_output *output, knurl_error *error);
 knurl_status knurl_output_commit(knurl_output *output, knurl_error *error);

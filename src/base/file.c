@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,32 +55,56 @@ knurl_status knurl_file_read(knurl_context *context, const char *path, unsigned 
     return KNURL_OK;
 }
 
+/* A new file beside `target`, empty, with the permissions of `existing` or, if that is NULL, those that
+ * the process's mask leaves. Its name goes to output->path, which is empty after a failure. */
+static int make_beside(knurl_output *output, const struct stat *existing)
+{
+    for (unsigned attempt = 0; attempt < 1000; attempt++) {
+        unsigned stamp = (unsigned)(fmod(knurl_seconds() * 1e6, 4e9)) + attempt;
+        int length = snprintf(output->path, sizeof output->path, "%s.%ld-%08x.tmp", output->target,
+                              (long)getpid(), stamp);
+        if (length < 0 || (size_t)length >= sizeof output->path) {
+            errno = ENAMETOOLONG;
+            break;
+        }
+        int file = open(output->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (file >= 0) {
+            if (existing) (void)fchmod(file, existing->st_mode & 0777);
+            return file;
+        }
+        if (errno != EEXIST) break;
+    }
+    output->path[0] = 0;
+    return -1;
+}
+
 knurl_status knurl_output_open(const char *target, knurl_output *output, knurl_error *error)
 {
     memset(output, 0, sizeof *output);
-    int length = snprintf(output->target, sizeof output->target, "%s", target);
-    int temporary = snprintf(output->path, sizeof output->path, "%s.XXXXXX.tmp", target);
-    if (length <= 0 || temporary < 0 || (size_t)temporary >= sizeof output->path)
-        return knurl_fail(error, KNURL_ERROR_OUTPUT, "output name is empty or too long");
     struct stat info;
-    if (stat(target, &info) == 0 && S_ISDIR(info.st_mode))
+    bool exists = stat(target, &info) == 0;
+    if (exists && S_ISDIR(info.st_mode))
         return knurl_fail(error, KNURL_ERROR_OUTPUT, "%s: is a directory", target);
-    int file = mkstemps(output->path, 4);
-    if (file < 0) {
-        knurl_status status = knurl_fail(error, KNURL_ERROR_OUTPUT, "%s: %s", target, strerror(errno));
-        output->path[0] = 0;
-        return status;
+    /* A link stays a link: what it points to is replaced. */
+    char *resolved = exists ? realpath(target, NULL) : NULL;
+    int length = snprintf(output->target, sizeof output->target, "%s", resolved ? resolved : target);
+    free(resolved);
+    if (length <= 0 || (size_t)length >= sizeof output->target)
+        return knurl_fail(error, KNURL_ERROR_OUTPUT, "output name is empty or too long");
+    output->in_place = exists && !S_ISREG(info.st_mode);
+    if (output->in_place) {
+        memcpy(output->path, output->target, sizeof output->path);
+        return KNURL_OK;
     }
-    mode_t mask = umask(0);
-    umask(mask);
-    (void)fchmod(file, 0666 & ~mask);
+    int file = make_beside(output, exists ? &info : NULL);
+    if (file < 0) return knurl_fail(error, KNURL_ERROR_OUTPUT, "%s: %s", target, strerror(errno));
     close(file);
     return KNURL_OK;
 }
 
 knurl_status knurl_output_commit(knurl_output *output, knurl_error *error)
 {
-    if (rename(output->path, output->target) != 0) {
+    if (!output->in_place && rename(output->path, output->target) != 0) {
         knurl_status status =
             knurl_fail(error, KNURL_ERROR_OUTPUT, "%s: %s", output->target, strerror(errno));
         knurl_output_discard(output);
@@ -91,7 +116,7 @@ knurl_status knurl_output_commit(knurl_output *output, knurl_error *error)
 
 void knurl_output_discard(knurl_output *output)
 {
-    if (output->path[0]) unlink(output->path);
+    if (output->path[0] && !output->in_place) unlink(output->path);
     output->path[0] = 0;
 }
 

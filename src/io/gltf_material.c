@@ -138,6 +138,15 @@ static void read_displacement(gltf_reader *g, const gltf_at *at, uint32_t *uv_se
         m->displacement_unnormalised = gltf_bool(r, &extras, "unnormalised", false);
 }
 
+/* For what changes how a scene looks elsewhere and not here. */
+static void warn_if_there(gltf_reader *g, const gltf_at *at, const char *key)
+{
+    char pointer[256];
+    if (at->value && gltf_member(at, key).value)
+        description_warn(g->description, "%s: %s: %s is ignored", g->report.file,
+                         gltf_pointer(at, pointer, sizeof pointer), key);
+}
+
 static void read_surface(gltf_reader *g, const gltf_at *at, uint32_t *uv_set, knurl_description_material *m)
 {
     gltf_report *r = &g->report;
@@ -150,6 +159,7 @@ static void read_surface(gltf_reader *g, const gltf_at *at, uint32_t *uv_set, kn
     read_texture_ref(g, &pbr, "metallicRoughnessTexture", uv_set, &m->metallic_roughness_texture);
     gltf_numbers(r, at, "emissiveFactor", 3, m->emissive);
     read_texture_ref(g, at, "emissiveTexture", uv_set, &m->emissive_texture);
+    warn_if_there(g, at, "normalTexture");
     m->double_sided = gltf_bool(r, at, "doubleSided", false);
     m->alpha_cutoff = gltf_number(r, at, "alphaCutoff", 0.5, 0.0, INFINITY);
     const char *mode = gltf_string(r, at, "alphaMode", "OPAQUE");
@@ -172,11 +182,7 @@ static void read_extensions(gltf_reader *g, const gltf_at *at, knurl_description
     for (int i = 0; i < 3; i++) m->emissive[i] *= strength;
     gltf_extension_open(r, at, "KHR_materials_transmission", &e);
     m->transmission = gltf_number(r, &e.at, "transmissionFactor", 0.0, 0.0, 1.0);
-    if (e.at.value && gltf_member(&e.at, "transmissionTexture").value) {
-        char pointer[256];
-        description_warn(g->description, "%s: %s: transmissionTexture is ignored", r->file,
-                         gltf_pointer(&e.at, pointer, sizeof pointer));
-    }
+    warn_if_there(g, &e.at, "transmissionTexture");
     gltf_extension_open(r, at, "KHR_materials_ior", &e);
     m->ior = gltf_number(r, &e.at, "ior", 1.5, 0.0, 100.0);
     /* The extension's 0 stands for an infinite index (full reflection). */

@@ -241,6 +241,23 @@ static void texcoord_set_of_the_displacement(void **state)
     knurl_description_release(d);
 }
 
+/* What would look different elsewhere is said; a texture that only helps rasterisers is not. */
+static void ignored_textures(void **state)
+{
+    (void)state;
+    static const char json[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"images\":[{\"uri\":\"n.png\"}],\"textures\":[{\"source\":0}],"
+        "\"materials\":[{},{\"normalTexture\":{\"index\":0},\"occlusionTexture\":{\"index\":0},"
+        "\"extensions\":{"
+        "\"KHR_materials_transmission\":{\"transmissionTexture\":{\"index\":0}}}}]}";
+    write_bytes(KNURL_TEST_DIR "/ignored.gltf", json, sizeof json - 1);
+    knurl_description *d = load_file(KNURL_TEST_DIR "/ignored.gltf");
+    assert_true(has_warning(d, "/materials/1: normalTexture is ignored"));
+    assert_true(has_warning(d, "/materials/1/extensions/KHR_materials_transmission: transmissionTexture is"));
+    assert_int_equal(d->warning_count, 2);
+    knurl_description_release(d);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -251,6 +268,7 @@ int main(void)
         cmocka_unit_test(glb_strips_fans_and_sparse),
         cmocka_unit_test(broken_glb),
         cmocka_unit_test(texcoord_set_of_the_displacement),
+        cmocka_unit_test(ignored_textures),
     };
     return cmocka_run_group_tests(tests, make_context, drop_context);
 }
