@@ -173,46 +173,57 @@ typedef struct side_end {
 } side_end;
 
 /* Of the barycentrics that grow inwards, the one that is last to reach zero ends the stretch. The nearest
- * to zero will not do: by a vertex two are. `inwards` is a short step into the stretch. */
-static side_end find_side(const ray_curve *c, double p, double inwards)
+ * to zero will not do: by a vertex two are. `inwards` is a step into the stretch. False if rounding hides
+ * whether one that is near zero grows. */
+static bool find_side_at(const ray_curve *c, double p, double inwards, side_end *end)
 {
     curve_point at = curve_at(c, p), inside = curve_at(c, p + inwards);
-    side_end end = {-1, 0.0, 0.0};
     double latest = -INFINITY;
+    bool clear = true;
+    *end = (side_end){-1, 0.0, 0.0};
     for (int i = 0; i < 3; i++) {
         double value = barycentric(&at, i), growth = barycentric(&inside, i) - value;
-        if (!(growth > 0.0) || !(fabs(value) <= 1e-5) || !(-value / growth > latest)) continue;
+        if (!(fabs(value) <= 1e-5)) continue;
+        if (!(fabs(growth) > c->barycentric_rounding)) clear = false;
+        if (!(growth > c->barycentric_rounding) || !(-value / growth > latest)) continue;
         latest = -value / growth;
-        end = (side_end){i, value, growth / inwards};
+        *end = (side_end){i, value, growth / inwards};
     }
+    return clear;
+}
+
+/* `inwards` is the whole stretch. A short step gives the better slope; on a stretch that is itself hardly
+ * longer than rounding only a long one gives any. A ray in a side of the prism shows no growth at all: that
+ * side does not end the stretch. */
+static side_end find_side(const ray_curve *c, double p, double inwards)
+{
+    side_end end;
+    if (!find_side_at(c, p, 1e-3 * inwards, &end)) (void)find_side_at(c, p, 0.25 * inwards, &end);
     return end;
 }
 
-static const double SHORT_STEP = 1e-3; /* of a stretch */
-
 double curve_end_zone(const ray_curve *c, const curve_interval *s, bool first)
 {
-    double inwards = SHORT_STEP * (first ? s->out - s->in : s->in - s->out);
+    double inwards = first ? s->out - s->in : s->in - s->out;
     if (inwards == 0.0) return 0.0;
     side_end end = find_side(c, first ? s->in : s->out, inwards);
     return end.side < 0
                ? 0.0
-               : copysign(min_d(2.0 * c->barycentric_rounding / fabs(end.slope), fabs(s->out - s->in)),
-                          inwards);
+               : copysign(min_d(2.0 * c->barycentric_rounding / fabs(end.slope), fabs(inwards)), inwards);
 }
 
 /* Moves an end that lies on a side to where the curve's points (not only the quadratics) pass it by the
- * rounding of b. Not by more than the stretch: near a vertex that is no longer than the allowance by which
- * the search was wide, an end may move over most of it. */
-static double settle_end(const ray_curve *c, double p, double inwards)
+ * rounding of b. Only inwards, since the search was wider than that; near a vertex, where a stretch is no
+ * longer than the search was wide, over most of it. */
+static double settle_end(const ray_curve *c, double start, double inwards)
 {
-    double length = fabs(inwards) / SHORT_STEP;
-    if (inwards == 0.0) return p;
+    if (inwards == 0.0) return start;
+    double p = start, other = start + inwards;
     side_end end = find_side(c, p, inwards);
     for (int i = 0; end.side >= 0 && i < 3; i++) {
-        double step = (end.value + c->barycentric_rounding) / end.slope;
-        if (!(fabs(step) <= length)) break;
-        p -= step;
+        double moved = p - (end.value + c->barycentric_rounding) / end.slope;
+        if (!(moved >= min_d(start, other) && moved <= max_d(start, other))) break;
+        p = moved;
         curve_point at = curve_at(c, p);
         end.value = barycentric(&at, end.side);
     }
@@ -226,7 +237,7 @@ static void settle_intervals(ray_curve *c)
     int kept = 0;
     for (int i = 0; i < c->interval_count; i++) {
         curve_interval s = c->intervals[i];
-        double inwards = SHORT_STEP * (s.out - s.in);
+        double inwards = s.out - s.in;
         double in = settle_end(c, s.in, inwards), out = settle_end(c, s.out, -inwards);
         s = (curve_interval){in, out, curve_depth(c, in), curve_depth(c, out)};
         curve_point at = curve_at(c, 0.5 * (s.in + s.out));
