@@ -135,6 +135,28 @@ static knurl_range all_levels_range(const shell_space *space, uint32_t triangle)
     return range;
 }
 
+/* Range of s = h / |N| for h in the shell's range, padded by more than the rounding of
+ * g(s) = s |N| - h, so that g has a definite sign at both ends even where h is constant. */
+static void set_height_range(const triangle_frame *f, shell *stored)
+{
+    double h0 = (double)stored->height_min, h1 = (double)stored->height_max;
+    double n_min = 1.0, n_max = 1.0;
+    if (!f->unnormalised) {
+        n_min = (double)stored->normal_min;
+        n_max =
+            sqrt(max_d(v3_dot(f->n[0], f->n[0]), max_d(v3_dot(f->n[1], f->n[1]), v3_dot(f->n[2], f->n[2]))));
+    }
+    double s0 = h0 < 0.0 ? h0 / n_min : h0 / n_max, s1 = h1 > 0.0 ? h1 / n_min : h1 / n_max;
+    double pad = 1e-9 * max_d(fabs(s0), fabs(s1)) + 1e-13 * f->size;
+    stored->s_min = round_down(s0 - pad);
+    stored->s_max = round_up(s1 + pad);
+}
+
+static double offset_area(const triangle_frame *f, double s)
+{
+    return v3_length(v3_cross(v3_mad(f->pe, s, f->ne), v3_mad(f->pf, s, f->nf)));
+}
+
 static void build_shell(const shell_space *space, const height_lod *lod, uint32_t triangle)
 {
     shell *stored = &space->shells[triangle];
@@ -146,7 +168,10 @@ static void build_shell(const shell_space *space, const height_lod *lod, uint32_
     triangle_frame_load(space, triangle, lod, &f);
     double least = least_normal(&f);
     stored->normal_min = space->unnormalised ? 1.0f : round_down(max_d(least, LEAST_NORMAL));
-    triangle_frame_load(space, triangle, lod, &f);
+    set_height_range(&f, stored);
+    f.s0 = (double)stored->s_min;
+    f.s1 = (double)stored->s_max;
+    stored->area = round_up((1.0 + 1e-9) * max_d(offset_area(&f, f.s0), offset_area(&f, f.s1)));
     if (is_empty(&f))
         stored->flags |= SHELL_EMPTY;
     else if (is_folded(&f) || (!space->unnormalised && least < LEAST_NORMAL))

@@ -457,12 +457,24 @@ static void follow_grazing(const triangle_frame *f, const ray_view *v, const knu
     if (!c->unreliable) follow_by_depth(f, v, c);
 }
 
-/* Twice the area of the larger of the offset triangles at both ends of the height range. */
-static double largest_area(const triangle_frame *f)
+bool ray_misses_prism(const triangle_frame *f, const knurl_ray *ray)
 {
-    vec3 low = v3_cross(v3_mad(f->pe, f->s0, f->ne), v3_mad(f->pf, f->s0, f->nf));
-    vec3 high = v3_cross(v3_mad(f->pe, f->s1, f->ne), v3_mad(f->pf, f->s1, f->nf));
-    return sqrt(max_d(v3_dot(low, low), v3_dot(high, high)));
+    ray_view v;
+    view_make(f, ray, &v);
+    quadratic q[3] = {side_quadratic(&v, 1, 2), side_quadratic(&v, 2, 0), side_quadratic(&v, 0, 1)}, w;
+    for (int k = 0; k < 3; k++) w.c[k] = q[0].c[k] + q[1].c[k] + q[2].c[k];
+    double b[3];
+    quadratic_bernstein(&w, f->s0, f->s1, b);
+    double lowest = min_d(b[0], min_d(b[1], b[2])), highest = max_d(b[0], max_d(b[1], b[2]));
+    double graze = GRAZING_SINE * f->area, allowance = side_allowance(f, &v);
+    /* Where W may be zero its sign says nothing. */
+    if (!(lowest > graze || highest < -graze)) return false;
+    double sign = lowest > 0.0 ? 1.0 : -1.0;
+    for (int i = 0; i < 3; i++) {
+        quadratic_bernstein(&q[i], f->s0, f->s1, b);
+        if (max_d(sign * b[0], max_d(sign * b[1], sign * b[2])) < -allowance) return true;
+    }
+    return false;
 }
 
 void ray_curve_make(const triangle_frame *f, const knurl_ray *ray, ray_curve *c)
@@ -488,7 +500,7 @@ void ray_curve_make(const triangle_frame *f, const knurl_ray *ray, ray_curve *c)
         c->b1 = side_quadratic(&v, 2, 0);
         c->b2 = side_quadratic(&v, 0, 1);
         for (int k = 0; k < 3; k++) c->w.c[k] = q0.c[k] + c->b1.c[k] + c->b2.c[k];
-        double area = largest_area(f);
+        double area = f->area;
         if (may_graze(c, f, GRAZING_SINE * area))
             follow_grazing(f, &v, ray, area, c);
         else

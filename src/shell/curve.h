@@ -55,6 +55,10 @@ typedef struct curve_point {
     double b1, b2, s, x, y;
 } curve_point;
 
+/* A cheap test before: whether the ray surely passes the prism by, and with it every point of S. True of
+ * folded shells too: a point of S at barycentrics b and height s has q_i(s) = b_i W(s). */
+bool ray_misses_prism(const triangle_frame *frame, const knurl_ray *ray);
+
 /* Finds the curve and its stretches inside the prism. The curve refers to the frame. */
 void ray_curve_make(const triangle_frame *frame, const knurl_ray *ray, ray_curve *curve);
 

@@ -58,26 +58,7 @@ static void load_texels(const shell_space *space, const uint32_t *v, const heigh
     f->yf = f->y[2] - f->y[0];
 }
 
-/* Range of s = h / |N| for h in the shell's range, padded by more than the rounding of
- * g(s) = s |N| - h, so that g has a definite sign at both ends even where h is constant. */
-static void load_height_range(const shell *stored, triangle_frame *f)
-{
-    double h0 = (double)stored->height_min, h1 = (double)stored->height_max;
-    double n_min = 1.0, n_max = 1.0;
-    if (!f->unnormalised) {
-        n_min = (double)stored->normal_min;
-        n_max =
-            sqrt(max_d(v3_dot(f->n[0], f->n[0]), max_d(v3_dot(f->n[1], f->n[1]), v3_dot(f->n[2], f->n[2]))));
-    }
-    f->s0 = h0 < 0.0 ? h0 / n_min : h0 / n_max;
-    f->s1 = h1 > 0.0 ? h1 / n_min : h1 / n_max;
-    double pad = 1e-9 * max_d(fabs(f->s0), fabs(f->s1)) + 1e-13 * f->size;
-    f->s0 -= pad;
-    f->s1 += pad;
-}
-
-void triangle_frame_load(const shell_space *space, uint32_t triangle, const height_lod *lod,
-                         triangle_frame *f)
+void triangle_frame_load_shape(const shell_space *space, uint32_t triangle, triangle_frame *f)
 {
     const uint32_t *v = space->mesh.triangles + 3 * (size_t)triangle;
     const shell *stored = &space->shells[triangle];
@@ -93,8 +74,15 @@ void triangle_frame_load(const shell_space *space, uint32_t triangle, const heig
     f->ne = v3_sub(f->n[1], f->n[0]);
     f->nf = v3_sub(f->n[2], f->n[0]);
     f->size = v3_max_component(v3_max(v3_abs(f->pe), v3_abs(f->pf)));
-    load_texels(space, v, lod, f);
-    load_height_range(stored, f);
+    f->s0 = (double)stored->s_min;
+    f->s1 = (double)stored->s_max;
+    f->area = (double)stored->area;
+}
+
+void triangle_frame_load_texels(const shell_space *space, uint32_t triangle, const height_lod *lod,
+                                triangle_frame *f)
+{
+    load_texels(space, space->mesh.triangles + 3 * (size_t)triangle, lod, f);
     double det = f->xe * f->yf - f->xf * f->ye;
     bool invertible = !(f->flags & SHELL_FLAT_UV) && det != 0.0;
     double inverse = invertible ? 1.0 / det : 0.0;
@@ -102,6 +90,13 @@ void triangle_frame_load(const shell_space *space, uint32_t triangle, const heig
     f->inverse_uv[1] = -f->xf * inverse;
     f->inverse_uv[2] = -f->ye * inverse;
     f->inverse_uv[3] = f->xe * inverse;
+}
+
+void triangle_frame_load(const shell_space *space, uint32_t triangle, const height_lod *lod,
+                         triangle_frame *f)
+{
+    triangle_frame_load_shape(space, triangle, f);
+    triangle_frame_load_texels(space, triangle, lod, f);
 }
 
 /* The four heights of cell (i, j), each times `weight`: (0,0), (1,0), (0,1), (1,1). */

@@ -28,6 +28,8 @@ enum {
 typedef struct shell {
     float height_min, height_max; /* range of h, rounded outwards */
     float normal_min;             /* lower bound of |N| over the triangle */
+    float s_min, s_max;           /* range of s = h / |N|, padded and rounded outwards */
+    float area;                   /* bound on twice the area of the offset triangles at s_min and s_max */
     uint32_t flags;
 } shell;
 
@@ -68,12 +70,17 @@ typedef struct triangle_frame {
     int64_t wrapped_x, wrapped_y; /* reads the same texels as the origin, from the first tile */
     double texel_rounding;        /* bound on the rounding of x, y */
     double size;                  /* largest |p| component, a length scale */
+    double area;                  /* the shell\'s */
     double s0, s1;                /* range of the unnormalised height, padded outwards */
     double inverse_uv[4];         /* (b1, b2) = M (x - x[0], y - y[0]); zeros when SHELL_FLAT_UV */
     uint32_t flags;
     bool unnormalised;
 } triangle_frame;
 
+/* In two parts: everything but texel coordinates, then those. Or both at once. */
+void triangle_frame_load_shape(const shell_space *space, uint32_t triangle, triangle_frame *frame);
+void triangle_frame_load_texels(const shell_space *space, uint32_t triangle, const height_lod *lod,
+                                triangle_frame *frame);
 void triangle_frame_load(const shell_space *space, uint32_t triangle, const height_lod *lod,
                          triangle_frame *frame);
 
