@@ -7,5 +7,8 @@ int render_command(int argc, char **argv);
 int trace_command(int argc, char **argv);
 int info_command(int argc, char **argv);
 int compare_command(int argc, char **argv);
+int bake_command(int argc, char **argv);
+int bench_command(int argc, char **argv);
+int capture_command(int argc, char **argv);
 
 #endif

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -99,8 +100,8 @@ knurl_heightmap_def heightmap_def_from(const method_options *method)
     return def;
 }
 
-static knurl_status override_displacement(knurl_description *description, const displacement_options *options,
-                                          knurl_error *error)
+knurl_status displacement_override(knurl_description *description, const displacement_options *options,
+                                   knurl_error *error)
 {
     knurl_displacement_override override = knurl_displacement_override_default();
     override.map = options->map;
@@ -132,7 +133,7 @@ int scene_load(command_session *session, const char *path, const displacement_op
     knurl_error error = {0};
     double start = seconds_now();
     knurl_status status = knurl_description_load(session->context, path, &loaded->description, &error);
-    if (status == KNURL_OK) status = override_displacement(loaded->description, displacement, &error);
+    if (status == KNURL_OK) status = displacement_override(loaded->description, displacement, &error);
     double middle = seconds_now();
     loaded->load_seconds = middle - start;
     if (status == KNURL_OK) status = build_scene(session, method, loaded, &error);
@@ -154,6 +155,37 @@ void scene_release(loaded_scene *loaded)
     if (loaded->description) knurl_description_release(loaded->description);
     loaded->scene = NULL;
     loaded->description = NULL;
+}
+
+int camera_find(command_session *session, const knurl_description *description, const char *text,
+                int32_t *camera)
+{
+    if (!text) return CODE_DONE;
+    for (uint32_t i = 0; i < description->camera_count; i++) {
+        const char *name = description->cameras[i].name;
+        if (name && strcmp(name, text) == 0) {
+            *camera = (int32_t)i;
+            return CODE_DONE;
+        }
+    }
+    char *end = NULL;
+    long number = strtol(text, &end, 10);
+    if (end != text && !*end && number >= 0 && (unsigned long)number < description->camera_count) {
+        *camera = (int32_t)number;
+        return CODE_DONE;
+    }
+    if (description->camera_count == 0)
+        return session_fail_with(session, CODE_USAGE, "--camera: found '%s', but the scene has no cameras",
+                                 text);
+    char names[512] = "";
+    size_t used = 0;
+    for (uint32_t i = 0; i < description->camera_count && used < sizeof names; i++) {
+        const char *name = description->cameras[i].name;
+        int more = snprintf(names + used, sizeof names - used, "%s%u%s%s%s", i ? ", " : "", i,
+                            name ? " (" : "", name ? name : "", name ? ")" : "");
+        if (more > 0) used += (size_t)more;
+    }
+    return session_fail_with(session, CODE_USAGE, "--camera: found '%s', expected one of %s", text, names);
 }
 
 const char *format_bytes(char text[32], double bytes)

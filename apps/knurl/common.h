@@ -67,6 +67,14 @@ int scene_load(command_session *session, const char *path, const displacement_op
                const method_options *method, loaded_scene *loaded);
 void scene_release(loaded_scene *loaded);
 
+/* The camera that --camera names, by number or by name; a NULL text leaves *camera as it is. */
+int camera_find(command_session *session, const knurl_description *description, const char *text,
+                int32_t *camera);
+
+/* The description's displacement as the options ask for it. */
+knurl_status displacement_override(knurl_description *description, const displacement_options *options,
+                                   knurl_error *error);
+
 /* Heightmap parameters that method options name. */
 knurl_heightmap_def heightmap_def_from(const method_options *method);
 

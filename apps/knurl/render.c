@@ -7,38 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* By number or by name. */
-static int choose_camera(command_session *session, const knurl_description *description, const char *text,
-                         int32_t *camera)
-{
-    if (!text) return CODE_DONE;
-    for (uint32_t i = 0; i < description->camera_count; i++) {
-        const char *name = description->cameras[i].name;
-        if (name && strcmp(name, text) == 0) {
-            *camera = (int32_t)i;
-            return CODE_DONE;
-        }
-    }
-    char *end = NULL;
-    long number = strtol(text, &end, 10);
-    if (end != text && !*end && number >= 0 && (unsigned long)number < description->camera_count) {
-        *camera = (int32_t)number;
-        return CODE_DONE;
-    }
-    if (description->camera_count == 0)
-        return session_fail_with(session, CODE_USAGE, "--camera: found '%s', but the scene has no cameras",
-                                 text);
-    char names[512] = "";
-    size_t used = 0;
-    for (uint32_t i = 0; i < description->camera_count && used < sizeof names; i++) {
-        const char *name = description->cameras[i].name;
-        int more = snprintf(names + used, sizeof names - used, "%s%u%s%s%s", i ? ", " : "", i,
-                            name ? " (" : "", name ? name : "", name ? ")" : "");
-        if (more > 0) used += (size_t)more;
-    }
-    return session_fail_with(session, CODE_USAGE, "--camera: found '%s', expected one of %s", text, names);
-}
-
 static json_t *describe_rays(const knurl_render_stats *stats)
 {
     return json_pack("{s:o, s:o, s:o}", "primary", json_count(stats->primary_rays), "diffuse",
@@ -145,7 +113,7 @@ int render_command(int argc, char **argv)
     if (code == CODE_DONE)
         code = scene_load(&session, options.scene, &options.displacement, &options.method, &loaded);
     if (code == CODE_DONE)
-        code = choose_camera(&session, loaded.description, options.camera, &options.def.camera);
+        code = camera_find(&session, loaded.description, options.camera, &options.def.camera);
     if (code == CODE_DONE) code = render_loaded(&session, &options, &loaded);
     scene_release(&loaded);
     session_close(&session);

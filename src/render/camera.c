@@ -67,6 +67,18 @@ void camera_frame(const double lower[3], const double upper[3], int32_t width, i
     *out = c;
 }
 
+knurl_status camera_choose(const knurl_description *description, const knurl_scene *scene, int32_t index,
+                           int32_t width, int32_t height, camera *out, knurl_error *error)
+{
+    if (index >= 0 || description->camera_count > 0)
+        return camera_from_description(&description->cameras[index < 0 ? 0 : index], width, height, out,
+                                       error);
+    double lower[3], upper[3];
+    knurl_scene_bounds(scene, lower, upper);
+    camera_frame(lower, upper, width, height, out);
+    return KNURL_OK;
+}
+
 knurl_ray camera_make_ray(const camera *c, double x, double y, double u, double v)
 {
     double px = (2.0 * x / c->width - 1.0) * c->half_width, py = (1.0 - 2.0 * y / c->height) * c->half_height;
@@ -91,6 +103,30 @@ knurl_ray camera_make_ray(const camera *c, double x, double y, double u, double 
     else
         ray.cone_spread = (float)(pixel * v3_dot(direction, c->forward));
     return ray;
+}
+
+knurl_status knurl_camera_rays(const knurl_description *description, const knurl_scene *scene,
+                               int32_t camera_index, int32_t width, int32_t height, knurl_ray *rays,
+                               knurl_error *error)
+{
+    if (!description || !scene || !rays)
+        return knurl_fail(error, KNURL_ERROR_ARGUMENT, "description, scene or rays is NULL");
+    if (width < 1 || width > 65536 || height < 1 || height > 65536)
+        return knurl_fail(error, KNURL_ERROR_ARGUMENT,
+                          "image is %d x %d pixels, expected 1 to 65536 per side", width, height);
+    if (camera_index < -1 || (camera_index >= 0 && (uint32_t)camera_index >= description->camera_count))
+        return knurl_fail(error, KNURL_ERROR_ARGUMENT, "camera is %d, the scene has %u", camera_index,
+                          description->camera_count);
+    camera c;
+    knurl_status status = camera_choose(description, scene, camera_index, width, height, &c, error);
+    for (int32_t y = 0; y < height && status == KNURL_OK; y++) {
+        for (int32_t x = 0; x < width; x++) {
+            knurl_ray *ray = &rays[(size_t)y * (size_t)width + (size_t)x];
+            *ray = camera_make_ray(&c, x + 0.5, y + 0.5, 0.5, 0.5);
+            ray->cone_width = ray->cone_spread = 0.0f;
+        }
+    }
+    return status;
 }
 
 /* Integral of the 4-term Blackman-Harris window on [-1, 1], from -1, normalised. */

@@ -4,7 +4,7 @@
 
 #include "math/vec.h"
 
-#include <knurl/description.h>
+#include <knurl/render.h>
 
 typedef struct camera {
     vec3 origin, right, up, forward; /* unit axes */
@@ -18,6 +18,9 @@ knurl_status camera_from_description(const knurl_description_camera *source, int
                                      camera *out, knurl_error *error);
 /* A three-quarter view from a little above that shows all of the box; `lower` > `upper`: of a unit box. */
 void camera_frame(const double lower[3], const double upper[3], int32_t width, int32_t height, camera *out);
+/* What knurl_render_def.camera says: an index that must be valid, or -1. */
+knurl_status camera_choose(const knurl_description *description, const knurl_scene *scene, int32_t index,
+                           int32_t width, int32_t height, camera *out, knurl_error *error);
 /* (x, y) in pixels from the top left corner; (u, v) in [0, 1) choose the point on the lens. The ray
  * carries the cone of a pixel. */
 knurl_ray camera_make_ray(const camera *c, double x, double y, double u, double v);

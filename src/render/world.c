@@ -31,19 +31,6 @@ static knurl_status make_environment(world *w, knurl_error *error)
                                      &w->environment, error);
 }
 
-static knurl_status make_camera(world *w, knurl_error *error)
-{
-    const knurl_render_def *def = w->def;
-    const knurl_description *d = w->description;
-    if (def->camera >= 0 || d->camera_count > 0)
-        return camera_from_description(&d->cameras[def->camera < 0 ? 0 : def->camera], def->width,
-                                       def->height, &w->camera, error);
-    double lower[3], upper[3];
-    knurl_scene_bounds(w->scene, lower, upper);
-    camera_frame(lower, upper, def->width, def->height, &w->camera);
-    return KNURL_OK;
-}
-
 /* The level of detail that a ray's cone gives is repeated by the rays that leave its hit, but only up to
  * the rounding of float cones and boxes: a few 1e-7 levels. Between two levels the surface moves by at
  * most its height range. */
@@ -103,7 +90,8 @@ knurl_status world_create(const knurl_description *description, const knurl_scen
     w->fixed_lod = def->lod_mode == KNURL_LOD_FIXED ? (float)def->lod : 0.0f;
     pixel_filter_build(&w->filter);
     albedo_build(w->context, &w->albedo);
-    knurl_status status = make_camera(w, error);
+    knurl_status status =
+        camera_choose(description, scene, def->camera, def->width, def->height, &w->camera, error);
     if (status == KNURL_OK) status = describe_instances(w, error);
     if (status == KNURL_OK) status = texture_set_create(description, &w->textures, error);
     if (status == KNURL_OK) status = make_environment(w, error);
