@@ -362,6 +362,7 @@ static inline unsigned int knurl_embree_attach_with(RTCDevice device, RTCScene s
                                                     RTCIntersectFunctionN intersect,
                                                     RTCOccludedFunctionN occluded)
 {
+    if (knurl_surface_flags(surface) & KNURL_METHOD_NATIVE) return RTC_INVALID_GEOMETRY_ID;
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
     if (!geometry) return RTC_INVALID_GEOMETRY_ID;
     rtcSetGeometryUserPrimitiveCount(geometry, knurl_surface_shell_count(surface));
@@ -380,8 +381,9 @@ static inline unsigned int knurl_embree_attach_with(RTCDevice device, RTCScene s
 /* ---- The calls to use ------------------------------------------------------------------------- */
 
 /* Adds the surface to the scene; returns its geometry ID, or RTC_INVALID_GEOMETRY_ID (then see
- * rtcGetDeviceError). The surface is not retained: release it after the scene. Masks and filter
- * functions can be set on rtcGetGeometry(scene, id) before rtcCommitScene. */
+ * rtcGetDeviceError; without an error there, the surface's method is KNURL_METHOD_NATIVE, whose facets
+ * knurl/tessellation.h gives to geometries of your own). The surface is not retained: release it after the
+ * scene. Masks and filter functions can be set on rtcGetGeometry(scene, id) before rtcCommitScene. */
 static inline unsigned int knurl_embree_attach(RTCDevice device, RTCScene scene, const knurl_surface *surface)
 {
     return knurl_embree_attach_with(device, scene, surface, knurl_embree_intersect, knurl_embree_occluded);

@@ -9,5 +9,6 @@
 #include <knurl/render.h>
 #include <knurl/scene.h>
 #include <knurl/surface.h>
+#include <knurl/tessellation.h>
 
 #endif

@@ -22,16 +22,6 @@
 static const double PRIMITIVE_PAD = 0x1p-19; /* 32 e */
 static const double BOUNDS_PAD = 0x1p-18;
 
-struct accel_bvh {
-    accel_device *device;
-    RTCScene scene; /* NULL if there is nothing in it */
-    accel_bounds_fn *bounds;
-    const void *user;
-    accel_box box;
-    vec3 centre, half; /* of the bounds; half is padded */
-    double scale;      /* s above */
-};
-
 typedef struct query {
     knurl_embree_query_context base; /* first: the callbacks get its address */
     accel_visit_fn *visit;
@@ -73,6 +63,13 @@ static knurl_status find_bounds(accel_bvh *bvh, uint32_t count, knurl_error *err
     return KNURL_OK;
 }
 
+void accel_bvh_set_half(accel_bvh *bvh)
+{
+    vec3 half = v3_max(v3_sub(bvh->box.upper, bvh->centre), v3_sub(bvh->centre, bvh->box.lower));
+    double pad = BOUNDS_PAD / bvh->scale;
+    bvh->half = v3_add(half, v3(pad, pad, pad));
+}
+
 static void set_frame(accel_bvh *bvh)
 {
     vec3 middle = v3_mad(v3_scale(bvh->box.lower, 0.5), 0.5, bvh->box.upper);
@@ -83,8 +80,7 @@ static void set_frame(accel_bvh *bvh)
     int exponent = 0;
     (void)frexp(radius, &exponent); /* radius < 2^exponent */
     bvh->scale = radius > 0.0 ? ldexp(1.0, exponent < -1000 ? 1000 : -exponent) : 1.0;
-    double pad = BOUNDS_PAD / bvh->scale;
-    bvh->half = v3_add(half, v3(pad, pad, pad));
+    accel_bvh_set_half(bvh);
 }
 
 static void embree_bounds(const struct RTCBoundsFunctionArguments *args)
@@ -108,12 +104,17 @@ static void embree_bounds(const struct RTCBoundsFunctionArguments *args)
     out->upper_z = (float)(upper.z + PRIMITIVE_PAD);
 }
 
-static float embree_tfar(const query *q)
+float accel_bvh_tfar(double tmax, double t0, double rate)
 {
     /* t itself has been rounded, which far along a ray is more than the float's last place. */
-    double slack = 0x1p-50 * (fabs(q->tmax) + fabs(q->t0));
-    double tau = ((q->tmax - q->t0) + slack) * q->rate;
+    double slack = 0x1p-50 * (fabs(tmax) + fabs(t0));
+    double tau = ((tmax - t0) + slack) * rate;
     return tau >= (double)FLT_MAX ? FLT_MAX : knurl_embree_float_above(tau);
+}
+
+static float embree_tfar(const query *q)
+{
+    return accel_bvh_tfar(q->tmax, q->t0, q->rate);
 }
 
 /* Returns the new tfar, or -infinity when the traversal is to end. */
@@ -265,24 +266,30 @@ bool accel_bvh_clip(const accel_bvh *bvh, vec3 origin, vec3 direction, double tm
     return isfinite(t0) && isfinite(t1) && v3_finite(segment->origin);
 }
 
-void accel_bvh_traverse(const accel_bvh *bvh, const accel_segment *segment, double tmax, bool any,
-                        accel_visit_fn *visit, void *user)
+bool accel_bvh_start_ray(const accel_bvh *bvh, const accel_segment *segment, struct RTCRay *ray, double *rate)
 {
-    query q = {.visit = visit, .user = user, .tmax = fmin(tmax, segment->t1), .t0 = segment->t0};
-    if (!(q.tmax >= q.t0)) return;
     int exponent = 0;
     (void)frexp(v3_max_component(v3_abs(segment->direction)), &exponent);
     double shrink = ldexp(1.0, -exponent);
     vec3 d = v3_scale(segment->direction, shrink), o = v3_scale(segment->origin, bvh->scale);
-    q.rate = bvh->scale / shrink;
-    if (!v3_finite(d) || !isfinite(q.rate) || !(q.rate > 0.0)) return;
-    knurl_embree_init_query(&q.base);
+    *rate = bvh->scale / shrink;
+    if (!v3_finite(d) || !isfinite(*rate) || !(*rate > 0.0)) return false;
+    memset(ray, 0, sizeof *ray);
+    ray->org_x = (float)o.x, ray->org_y = (float)o.y, ray->org_z = (float)o.z;
+    ray->dir_x = (float)d.x, ray->dir_y = (float)d.y, ray->dir_z = (float)d.z;
+    ray->mask = 0xFFFFFFFFu;
+    return true;
+}
+
+void accel_bvh_traverse(const accel_bvh *bvh, const accel_segment *segment, double tmax, bool any,
+                        accel_visit_fn *visit, void *user)
+{
+    query q = {.visit = visit, .user = user, .tmax = fmin(tmax, segment->t1), .t0 = segment->t0};
     struct RTCRayHit ray;
-    memset(&ray, 0, sizeof ray);
-    ray.ray.org_x = (float)o.x, ray.ray.org_y = (float)o.y, ray.ray.org_z = (float)o.z;
-    ray.ray.dir_x = (float)d.x, ray.ray.dir_y = (float)d.y, ray.ray.dir_z = (float)d.z;
+    if (!(q.tmax >= q.t0) || !accel_bvh_start_ray(bvh, segment, &ray.ray, &q.rate)) return;
+    memset(&ray.hit, 0, sizeof ray.hit);
+    knurl_embree_init_query(&q.base);
     ray.ray.tfar = embree_tfar(&q);
-    ray.ray.mask = 0xFFFFFFFFu;
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     if (any)

@@ -16,6 +16,9 @@ knurl_status accel_object_build(accel_object *object, accel_device *device, uint
 {
     char what[48];
     (void)snprintf(what, sizeof what, "the hierarchy of object %u", number);
+    const native_mesh *facets = object->surface ? knurl_surface_native(object->surface) : NULL;
+    object->native = facets != NULL;
+    if (facets) return accel_native_create(device, facets, what, &object->bvh, error);
     if (object->surface)
         return accel_bvh_create(device, knurl_surface_shell_count(object->surface), surface_bounds,
                                 object->surface, what, &object->bvh, error);
@@ -109,9 +112,19 @@ static double visit_triangle(void *user, uint32_t triangle, double tmax)
     return s->t;
 }
 
+static bool intersect_facets(const accel_object *object, const accel_local_ray *local, double tmax,
+                             knurl_hit *hit)
+{
+    native_hit found;
+    if (!accel_native_intersect(object->bvh, &local->segment, tmax, &found)) return false;
+    knurl_surface_native_hit(object->surface, &local->ray, &found, hit);
+    return true;
+}
+
 bool accel_object_intersect(const accel_object *object, const accel_local_ray *local, double tmax,
                             knurl_hit *hit, uint32_t *steps)
 {
+    if (object->native) return intersect_facets(object, local, tmax, hit);
     trace s;
     start_trace(&s, object, local);
     s.hit = hit;
@@ -146,6 +159,7 @@ static double any_triangle(void *user, uint32_t triangle, double tmax)
 
 bool accel_object_occluded(const accel_object *object, const accel_local_ray *local)
 {
+    if (object->native) return accel_native_occluded(object->bvh, &local->segment, local->ray.tmax);
     trace s;
     start_trace(&s, object, local);
     accel_bvh_traverse(object->bvh, &local->segment, local->ray.tmax, true,

@@ -1,13 +1,16 @@
-/* accel/object.h: what a scene places: a displaced surface or a plain mesh with its hierarchy. */
+/* accel/object.h: what a scene places: a displaced surface, by shells or by facets, or a plain mesh, with its
+ * hierarchy. */
 #ifndef KNURL_SRC_ACCEL_OBJECT_H
 #define KNURL_SRC_ACCEL_OBJECT_H
 
 #include "accel/mesh.h"
+#include "accel/native.h"
 
 typedef struct accel_object {
     knurl_surface *surface; /* one of these two; retained */
     accel_mesh *mesh;       /* owned */
     accel_bvh *bvh;         /* NULL until built */
+    bool native;            /* of the surface's facets; else of its shells */
 } accel_object;
 
 knurl_status accel_object_build(accel_object *object, accel_device *device, uint32_t number,

@@ -4,6 +4,7 @@
 #ifndef KNURL_SRC_METHODS_METHOD_H
 #define KNURL_SRC_METHODS_METHOD_H
 
+#include "methods/native.h"
 #include "shell/shell.h"
 
 enum { METHOD_MAX_PARAMETERS = 16 };
@@ -31,6 +32,9 @@ typedef struct method {
     bool (*intersect)(const void *data, const method_query *query);
     uint64_t (*bytes)(const void *data);
     void (*destroy)(const shell_space *space, void *data);
+    /* KNURL_METHOD_NATIVE only: the facets, and where a hit on them is, b1, b2 and 1 - b1 - b2 within [0, 1]. */
+    const native_mesh *(*native)(const void *data);
+    void (*locate)(const void *data, const native_hit *hit, native_place *place);
 } method;
 
 /* The method of that name; NULL if there is none. */
@@ -39,9 +43,19 @@ const method *method_find(const char *name, size_t length);
 knurl_status method_parse(const char *specification, const method **found,
                           double values[METHOD_MAX_PARAMETERS], knurl_error *error);
 
+/* Its space, for what is made from surfaces. Not retained. */
+const shell_space *knurl_surface_space(const knurl_surface *surface);
 /* The surface's map, for telling shared ones apart. Not retained. */
 const knurl_heightmap *knurl_surface_map(const knurl_surface *surface);
 
 extern const method method_rmip;
+extern const method method_tessellation;
+extern const method method_tfdm;
+extern const method method_pdm;
+extern const method method_secant;
+extern const method method_texel_walk;
+extern const method method_binary;
+extern const method method_robust_binary;
+extern const method method_empty_skip;
 
 #endif

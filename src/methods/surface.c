@@ -1,7 +1,8 @@
 /* The public surface: mesh, map and method together. */
 #include "methods/method.h"
+#include "shell/curve.h"
+#include "shell/evaluate.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 struct knurl_surface {
@@ -231,14 +232,13 @@ bool knurl_surface_shell_bounds(const knurl_surface *surface, uint32_t shell_ind
 
 /* Methods form products of several direction components, so that very long and very short directions
  * would overflow. A power of two takes the length out of the direction and into t, without rounding.
- * Returns the exponent. */
+ * Returns the exponent; 0, and *scaled not written, for all ordinary rays. */
 static int scale_direction(const knurl_ray *ray, knurl_ray *scaled)
 {
-    enum { PLAIN_EXPONENT = 64 };
-    *scaled = *ray;
     double longest = v3_max_component(v3_abs(v3_load(ray->direction)));
-    int exponent = longest > 0.0 && isfinite(longest) ? ilogb(longest) : 0;
-    if (abs(exponent) <= PLAIN_EXPONENT) return 0;
+    if ((longest >= 0x1p-64 && longest <= 0x1p64) || !(longest > 0.0) || !isfinite(longest)) return 0;
+    int exponent = ilogb(longest);
+    *scaled = *ray;
     for (int i = 0; i < 3; i++) scaled->direction[i] = ldexp(ray->direction[i], -exponent);
     scaled->tmin = ldexp(ray->tmin, exponent);
     scaled->tmax = ldexp(ray->tmax, exponent);
@@ -256,9 +256,12 @@ static bool query(const knurl_surface *surface, uint32_t triangle, const knurl_r
     knurl_ray scaled;
     uint32_t steps = 0;
     int exponent = scale_direction(ray, &scaled);
+    const knurl_ray *traced = exponent != 0 ? &scaled : ray;
+    triangle_frame_load_shape(space, triangle, &frame);
+    if ((surface->method->flags & KNURL_METHOD_EXACT) && ray_misses_prism(&frame, traced)) return false;
     height_lod_make(space, (double)ray->lod, &lod);
-    triangle_frame_load(space, triangle, &lod, &frame);
-    method_query q = {space, &lod, &frame, &scaled, any, &root, &steps};
+    triangle_frame_load_texels(space, triangle, &lod, &frame);
+    method_query q = {space, &lod, &frame, traced, any, &root, &steps};
     bool found = surface->method->intersect(surface->data, &q);
     if (found && exponent != 0) root.t = ldexp(root.t, -exponent);
     found = found && isfinite(root.t);
@@ -295,6 +298,39 @@ double knurl_surface_cone_lod(const knurl_surface *surface, const knurl_ray *ray
 void knurl_surface_get_info(const knurl_surface *surface, knurl_surface_info *info)
 {
     *info = surface->info;
+}
+
+uint32_t knurl_surface_flags(const knurl_surface *surface)
+{
+    return surface->method->flags;
+}
+
+const native_mesh *knurl_surface_native(const knurl_surface *surface)
+{
+    return surface->method->native ? surface->method->native(surface->data) : NULL;
+}
+
+void knurl_surface_native_hit(const knurl_surface *surface, const knurl_ray *ray, const native_hit *found,
+                              knurl_hit *hit)
+{
+    const shell_space *space = &surface->space;
+    native_place place;
+    height_lod lod;
+    triangle_frame frame;
+    shell_root root;
+    surface->method->locate(surface->data, found, &place);
+    height_lod_make(space, 0.0, &lod);
+    triangle_frame_load(space, place.triangle, &lod, &frame);
+    shell_root_at(space, &lod, &frame, place.b1, place.b2, found->t, &root);
+    shell_hit_fill(space, &lod, &frame, place.triangle, ray, &root, hit);
+    /* The way from the facet to S is in the error already; facets are in float. */
+    hit->error += 0x1p-21 / surface->method->native(surface->data)->scale;
+    hit->steps = 0;
+}
+
+const shell_space *knurl_surface_space(const knurl_surface *surface)
+{
+    return &surface->space;
 }
 
 const knurl_heightmap *knurl_surface_map(const knurl_surface *surface)

@@ -32,7 +32,13 @@ knurl_scene_memory knurl_scene_get_memory(const knurl_scene *scene)
         knurl_surface_get_info(object->surface, &info);
         memory.mesh += info.mesh_bytes;
         memory.shells += info.shell_bytes;
-        if (!map_seen(scene, i)) memory.maps += info.map_bytes;
+        if (map_seen(scene, i)) continue;
+        memory.maps += info.map_bytes;
+        knurl_heightmap_bytes parts = knurl_heightmap_memory(knurl_surface_map(object->surface));
+        memory.map_parts.samples += parts.samples;
+        memory.map_parts.levels += parts.levels;
+        memory.map_parts.minmax += parts.minmax;
+        memory.map_parts.rmip += parts.rmip;
     }
     memory.bvh = accel_device_bytes(scene->device);
     return memory;

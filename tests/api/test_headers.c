@@ -14,7 +14,7 @@
 
 static const char *const headers[] = {
     "base.h",        "image.h",  "heightmap.h", "surface.h", "scene.h",
-    "description.h", "render.h", "knurl.h",     "embree.h",
+    "description.h", "render.h", "knurl.h",     "embree.h",  "tessellation.h",
 };
 
 /* Compiles a file that does nothing but include the header, twice. */

@@ -34,6 +34,9 @@ static const variant VARIANTS[] = {
     {"rmip:bounds=minmax", 0.25},
     {"rmip:marching-scale=1", 0.25},
     {"rmip:inversion=off:bounds=minmax:marching-scale=1", 0.25},
+    {"tfdm", 0.5},
+    {"tfdm:leaf-texels=8:boxes=normal", 0.25},
+    {"tfdm:leaf-texels=32", 0.25},
 };
 
 enum { VARIANT_COUNT = sizeof VARIANTS / sizeof VARIANTS[0] };

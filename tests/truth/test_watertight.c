@@ -29,9 +29,14 @@ typedef struct torus_case {
 /* Methods that claim to be watertight join here. Heights stay under the tube's radius of 0.4, so the
  * circle in the tube's middle stays inside and the shells do not fold. */
 static const torus_case CASES[] = {
-    {"plain", 12, 8, 0.12, -0.03, 0.0, 1.0, "rmip"}, {"strong", 9, 7, 0.35, -0.12, 0.0, 1.0, "rmip"},
-    {"tiled", 12, 8, 0.06, 0.0, 0.0, 6.0, "rmip"},   {"coarse", 5, 4, 0.1, 0.0, 0.0, 2.0, "rmip"},
+    {"plain", 12, 8, 0.12, -0.03, 0.0, 1.0, "rmip"},
+    {"strong", 9, 7, 0.35, -0.12, 0.0, 1.0, "rmip"},
+    {"tiled", 12, 8, 0.06, 0.0, 0.0, 6.0, "rmip"},
+    {"coarse", 5, 4, 0.1, 0.0, 0.0, 2.0, "rmip"},
     {"far", 12, 8, 0.12, -0.03, 1e5, 1.0, "rmip"},
+    {"plain", 12, 8, 0.12, -0.03, 0.0, 1.0, "tfdm"},
+    {"tiled", 12, 8, 0.06, 0.0, 0.0, 6.0, "tfdm:leaf-texels=8:boxes=normal"},
+    {"far", 12, 8, 0.12, -0.03, 1e5, 1.0, "tfdm"},
 };
 
 typedef struct torus {
@@ -180,7 +185,8 @@ static bool touches(const torus *t, const oracle_ray *ray, const knurl_hit *hit,
         if (fabs(roots[i].t - hit->t) * sqrt(length) <= rounding) return false;
     }
     double least = fmin(1.0 - hit->a - hit->b, fmin(hit->a, hit->b));
-    return (cosine < 1e-3 || fabs(least) < 1e-8) && oracle_gap(t->o, ray, hit->triangle, hit->a, hit->b) <= rounding;
+    return (cosine < 1e-3 || fabs(least) < 1e-8) &&
+           oracle_gap(t->o, ray, hit->triangle, hit->a, hit->b) <= rounding;
 }
 
 /* Whether the oracle knows a reason: a root that rounding decides, or two closer than the step, or a hit

@@ -1,0 +1,104 @@
+/* Straight segments of a ray in texture space; see segment.h. */
+#include "shell/segment.h"
+
+#include <float.h>
+
+/* k of N = c - k P by least squares over the edges; 0 if N is not of that form within the rounding of
+ * directions stored as floats. */
+static double convergence(const triangle_frame *f)
+{
+    if (f->flags & SHELL_CONSTANT_NORMAL) return 0.0;
+    double edges = v3_dot(f->pe, f->pe) + v3_dot(f->pf, f->pf);
+    double k = -(v3_dot(f->ne, f->pe) + v3_dot(f->nf, f->pf)) / edges;
+    double off = max_d(v3_length(v3_mad(f->ne, k, f->pe)), v3_length(v3_mad(f->nf, k, f->pf)));
+    double longest = max_d(v3_length(f->n[0]), max_d(v3_length(f->n[1]), v3_length(f->n[2])));
+    return off <= 8.0 * (double)FLT_EPSILON * longest ? k : 0.0;
+}
+
+static segment_point point_at(const ray_curve *c, double p, double k)
+{
+    curve_point at = curve_at(c, p);
+    return (segment_point){.t = curve_depth(c, p),
+                           .b1 = at.b1,
+                           .b2 = at.b2,
+                           .x = at.x,
+                           .y = at.y,
+                           .h = at.s * frame_normal_scale(c->frame, at.b1, at.b2),
+                           .weight = 1.0 - k * at.s};
+}
+
+/* Narrows a stretch to the ray's [tmin, tmax], a little wider than that; false if nothing is left. */
+static bool clip_to_ray(const ray_curve *c, const knurl_ray *ray, const curve_interval *stretch, double *in,
+                        double *out)
+{
+    double slack =
+        1e-12 * (fabs(stretch->t_in) + fabs(stretch->t_out)) + 1e-9 * (stretch->t_out - stretch->t_in);
+    *in = stretch->in;
+    *out = stretch->out;
+    if (stretch->t_out < ray->tmin - slack || stretch->t_in > ray->tmax + slack) return false;
+    if (ray->tmin > stretch->t_in) *in = curve_invert(c, stretch->in, stretch->out, ray->tmin - slack);
+    if (ray->tmax < stretch->t_out) *out = curve_invert(c, stretch->in, stretch->out, ray->tmax + slack);
+    return true;
+}
+
+/* Weights of one sign, made positive: all that (1) reads are their ratios. */
+static bool settle_weights(shell_segment *s)
+{
+    double least = 1e-9 * (fabs(s->in.weight) + fabs(s->out.weight));
+    if (s->in.weight < 0.0 && s->out.weight < 0.0) {
+        s->in.weight = -s->in.weight;
+        s->out.weight = -s->out.weight;
+    }
+    return s->in.weight > least && s->out.weight > least;
+}
+
+static double height_rounding(const ray_curve *c)
+{
+    const triangle_frame *f = c->frame;
+    double s = max_d(fabs(f->s0), fabs(f->s1)), longest = 1.0, turn = 0.0;
+    if (!f->unnormalised) {
+        longest = max_d(v3_length(f->n[0]), max_d(v3_length(f->n[1]), v3_length(f->n[2])));
+        turn = v3_length(f->ne) + v3_length(f->nf);
+    }
+    return longest * c->height_rounding + turn * s * c->barycentric_rounding +
+           32.0 * DBL_EPSILON * s * longest;
+}
+
+bool shell_segments_make(const triangle_frame *f, const knurl_ray *ray, shell_segments *out)
+{
+    ray_curve curve;
+    out->count = 0;
+    out->exact = false;
+    out->texel_rounding = out->height_rounding = 0.0;
+    if (f->flags & SHELL_FOLDED) return false;
+    ray_curve_make(f, ray, &curve);
+    if (curve.unreliable) return false;
+    if (curve.interval_count == 0) return true;
+    double k = convergence(f);
+    out->exact = (f->flags & SHELL_CONSTANT_NORMAL) || (f->unnormalised && k != 0.0);
+    out->texel_rounding = curve.texel_rounding;
+    out->height_rounding = height_rounding(&curve);
+    for (int i = 0; i < curve.interval_count; i++) {
+        double first, last;
+        if (!clip_to_ray(&curve, ray, &curve.intervals[i], &first, &last)) continue;
+        shell_segment *s = &out->list[out->count];
+        *s = (shell_segment){point_at(&curve, first, k), point_at(&curve, last, k)};
+        if (!settle_weights(s)) {
+            out->count = 0;
+            return false;
+        }
+        out->count++;
+    }
+    return true;
+}
+
+void segment_patch(const shell_space *space, const height_lod *lod, const triangle_frame *f, double x,
+                   double y, height_patch *patch)
+{
+    int64_t i1 = 0, j1 = 0;
+    if (lod->blend > 0.0) {
+        i1 = (int64_t)floor_d((x + (double)f->origin_x + 0.5) * lod->ratio[0] - 0.5);
+        j1 = (int64_t)floor_d((y + (double)f->origin_y + 0.5) * lod->ratio[1] - 0.5);
+    }
+    height_patch_load(space, lod, f, (int64_t)floor_d(x), (int64_t)floor_d(y), i1, j1, patch);
+}
