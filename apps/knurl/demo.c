@@ -13,16 +13,18 @@
 
 typedef struct demo_options {
     const char *name, *folder;
-    int32_t size;
+    int32_t size, limit;
     uint32_t seed;
     bool glb, quiet;
 } demo_options;
 
-enum { SIZE_KEY = 256, SEED_KEY, GLB_KEY };
+enum { SIZE_KEY = 256, LIMIT_KEY, SEED_KEY, GLB_KEY };
 
 static const struct argp_option options[] = {
     {"size", SIZE_KEY, "N", 0,
      "Texels along the longer side of each height map, 16 to 16384 (default: each map's own)", 0},
+    {"map-size", LIMIT_KEY, "N", 0,
+     "Reduce every map whose longer side has more texels than N, 16 to 16384; the pattern stays", 0},
     {"seed", SEED_KEY, "N", 0, "Start of all random numbers (default 0); same seed, same files", 0},
     {"glb", GLB_KEY, NULL, 0, "One NAME.glb in place of NAME.gltf and NAME.bin; maps stay files", 0},
     {"quiet", 'q', NULL, 0, "Print nothing", 0},
@@ -34,6 +36,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     switch (key) {
     case SIZE_KEY:
         o->size = (int32_t)value_integer(state, "--size", argument, 16, 16384);
+        return 0;
+    case LIMIT_KEY:
+        o->limit = (int32_t)value_integer(state, "--map-size", argument, 16, 16384);
         return 0;
     case SEED_KEY:
         o->seed = (uint32_t)value_integer(state, "--seed", argument, 0, UINT32_MAX);
@@ -63,32 +68,53 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
 static const struct argp parser = {
     options,
     parse_option,
-    "NAME|all DIR\nlist",
+    "NAME|GROUP|all DIR\nlist",
     "Write sample scenes: glTF 2.0 with 16-bit displacement maps, made on the spot.\v"
     "A scene goes to DIR/NAME/NAME.gltf with its files beside it. Folders are made as needed.\n\n"
     "  knurl demo list                  name the scenes\n"
     "  knurl demo gallery scenes        write scenes/gallery/gallery.gltf\n"
-    "  knurl demo all scenes --size 512 write every scene with small maps\n",
+    "  knurl demo all scenes --size 512 write every sample with small maps\n"
+    "  knurl demo rmip scenes           write a group of bench scenes\n\n"
+    "`all' leaves the groups rmip, pdm, baboud and kolb out: they stand for the tables of papers and have "
+    "maps of up to 8192 x 8192 texels; --map-size makes them small.\n",
     NULL,
     NULL,
     NULL};
 
+/* Samples have no group, and are what `all' means. */
+static const char *group_of(const demo_entry *entry)
+{
+    return entry->group ? entry->group : "all";
+}
+
+static bool is_named(const demo_entry *entry, const char *name)
+{
+    return !strcmp(entry->name, name) || !strcmp(group_of(entry), name);
+}
+
 static int list_scenes(void)
 {
     for (int i = 0; i < demo_entry_count; i++)
-        printf("%-13s %s\n", demo_entries[i].name, demo_entries[i].summary);
+        printf("%-16s %-7s %s\n", demo_entries[i].name, group_of(&demo_entries[i]), demo_entries[i].summary);
     return CODE_DONE;
 }
 
 static int unknown_scene(const char *name)
 {
-    const char *names[64] = {NULL};
-    for (int i = 0; i < demo_entry_count && i < 63; i++) names[i] = demo_entries[i].name;
+    enum { MOST = 96 };
+    const char *names[MOST + 1] = {NULL};
+    int count = 0;
+    for (int i = 0; i < demo_entry_count && count < MOST - 1; i++) {
+        /* Each group before its first scene. */
+        const char *group = group_of(&demo_entries[i]);
+        if (i == 0 || strcmp(group, group_of(&demo_entries[i - 1])) != 0) names[count++] = group;
+        names[count++] = demo_entries[i].name;
+    }
     const char *near = nearest_name(name, names);
-    fprintf(stderr, "knurl demo: found '%s', expected the name of a scene", name);
+    fprintf(stderr, "knurl demo: found '%s', expected the name of a scene or group", name);
     if (near) fprintf(stderr, "; did you mean '%s'?", near);
-    fputs("\nScenes: all", stderr);
-    for (int i = 0; names[i]; i++) fprintf(stderr, ", %s", names[i]);
+    fputs("\nScenes and groups:", stderr);
+    for (int i = 0; names[i]; i++) fprintf(stderr, "%s%s", i ? ", " : " ", names[i]);
     fputs("\n", stderr);
     return CODE_USAGE;
 }
@@ -126,6 +152,7 @@ static int write_scene(const demo_options *o, const demo_entry *entry, knurl_con
                         .error = &error,
                         .name = entry->name,
                         .map_size = o->size,
+                        .map_limit = o->limit,
                         .seed = o->seed * 1009u + 1u,
                         .glb = o->glb};
     int length = snprintf(scene.folder, sizeof scene.folder, "%s/%s", o->folder, entry->name);
@@ -151,8 +178,8 @@ int demo_command(int argc, char **argv)
     demo_options o = {0};
     argp_parse(&parser, argc, argv, 0, NULL, &o);
     if (!strcmp(o.name, "list")) return list_scenes();
-    bool all = !strcmp(o.name, "all"), found = all;
-    for (int i = 0; i < demo_entry_count; i++) found = found || !strcmp(o.name, demo_entries[i].name);
+    bool found = false;
+    for (int i = 0; i < demo_entry_count; i++) found = found || is_named(&demo_entries[i], o.name);
     if (!found) return unknown_scene(o.name);
     if (!o.folder || !o.folder[0]) {
         fprintf(stderr, "knurl demo: no folder given, expected `knurl demo %s DIR'\n", o.name);
@@ -167,7 +194,7 @@ int demo_command(int argc, char **argv)
     }
     int code = CODE_DONE;
     for (int i = 0; i < demo_entry_count && code == CODE_DONE; i++)
-        if (all || !strcmp(o.name, demo_entries[i].name)) code = write_scene(&o, &demo_entries[i], context);
+        if (is_named(&demo_entries[i], o.name)) code = write_scene(&o, &demo_entries[i], context);
     knurl_context_release(context);
     return code;
 }

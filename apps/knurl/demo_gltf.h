@@ -23,6 +23,7 @@ typedef struct demo_scene {
     const char *name;  /* of the scene, and the stem of its files */
     char folder[3000]; /* files go here */
     int32_t map_size;  /* asked for by --size, 0: each map's own */
+    int32_t map_limit; /* asked for by --map-size, 0: none */
     uint32_t seed;
     bool glb;
 

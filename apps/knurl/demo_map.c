@@ -2,11 +2,12 @@
 #include "demo_map.h"
 
 #include "demo_noise.h"
+#include "parallel.h"
 
 #include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct grid {
     const demo_pattern *pattern;
@@ -16,33 +17,27 @@ typedef struct grid {
     uint8_t *colors, *surfaces;
 } grid;
 
+enum { ROWS_PER_CHUNK = 8 };
+
 /* Rows of a loop, dealt out to threads: each texel depends on its place only. */
 typedef struct row_loop {
-    void (*work)(grid *g, int32_t row);
-    grid *g;
+    void (*work)(void *user, int32_t row);
+    void *user;
     int32_t rows;
-    atomic_int next;
 } row_loop;
 
-static void *row_worker(void *argument)
+static void do_rows(void *user, size_t chunk)
 {
-    row_loop *loop = argument;
-    for (int32_t row; (row = atomic_fetch_add(&loop->next, 1)) < loop->rows;) loop->work(loop->g, row);
-    return NULL;
+    const row_loop *loop = user;
+    int32_t first = (int32_t)chunk * ROWS_PER_CHUNK, end = first + ROWS_PER_CHUNK;
+    for (int32_t row = first; row < end && row < loop->rows; row++) loop->work(loop->user, row);
 }
 
-static void for_rows(demo_scene *scene, grid *g, int32_t rows, void (*work)(grid *, int32_t))
+static void for_rows(demo_scene *scene, void *user, int32_t rows, void (*work)(void *, int32_t))
 {
-    enum { MAX_THREADS = 64 };
-    row_loop loop = {.work = work, .g = g, .rows = rows};
-    atomic_init(&loop.next, 0);
-    pthread_t threads[MAX_THREADS];
-    int started = 0, wanted = (int)knurl_context_threads(scene->context) - 1;
-    while (started < wanted && started < MAX_THREADS &&
-           !pthread_create(&threads[started], NULL, row_worker, &loop))
-        started++;
-    row_worker(&loop);
-    for (int i = 0; i < started; i++) pthread_join(threads[i], NULL);
+    row_loop loop = {work, user, rows};
+    parallel_chunks((int)knurl_context_threads(scene->context),
+                    (size_t)((rows + ROWS_PER_CHUNK - 1) / ROWS_PER_CHUNK), do_rows, &loop);
 }
 
 static double texel_place(const demo_pattern *pattern, int32_t i, int32_t count)
@@ -50,11 +45,25 @@ static double texel_place(const demo_pattern *pattern, int32_t i, int32_t count)
     return pattern->octahedral && count > 1 ? (double)i / (count - 1) : (i + 0.5) / count;
 }
 
-static void height_row(grid *g, int32_t row)
+/* The mean over a texel's square: patterns that are finer than the map do not alias. */
+static double mean_height(const grid *g, int32_t x, int32_t y, int32_t across)
 {
+    double sum = 0;
+    for (int32_t j = 0; j < across; j++)
+        for (int32_t i = 0; i < across; i++)
+            sum += g->pattern->height(g->pattern, (x + (i + 0.5) / across) / g->columns,
+                                      (y + (j + 0.5) / across) / g->rows);
+    return sum / (across * across);
+}
+
+static void height_row(void *user, int32_t row)
+{
+    grid *g = user;
     double v = texel_place(g->pattern, row, g->rows);
     for (int32_t x = 0; x < g->columns; x++) {
-        double h = g->pattern->height(g->pattern, texel_place(g->pattern, x, g->columns), v);
+        double h = g->pattern->oversample > 1
+                       ? mean_height(g, x, row, g->pattern->oversample)
+                       : g->pattern->height(g->pattern, texel_place(g->pattern, x, g->columns), v);
         g->heights[(size_t)row * (size_t)g->columns + (size_t)x] = (float)demo_clamp(h, 0, 1);
     }
 }
@@ -86,31 +95,70 @@ static int32_t neighbour(const grid *g, int32_t i, int32_t count)
     return i < 0 ? i + count : i >= count ? i - count : i;
 }
 
-/* Running mean of 2 * radius + 1 values at a stride. */
-static void blur_line(const grid *g, const float *in, float *out, int32_t count, size_t stride,
-                      int32_t radius)
-{
-    double sum = 0;
-    for (int32_t i = -radius; i <= radius; i++) sum += (double)in[(size_t)neighbour(g, i, count) * stride];
-    for (int32_t i = 0; i < count; i++) {
-        out[(size_t)i * stride] = (float)(sum / (2 * radius + 1));
-        sum += (double)in[(size_t)neighbour(g, i + radius + 1, count) * stride] -
-               (double)in[(size_t)neighbour(g, i - radius, count) * stride];
-    }
-}
+typedef struct blur_job {
+    grid *g;
+    float *copy;
+} blur_job;
 
-static bool blur(grid *g)
+static int32_t blur_radius(const grid *g)
 {
     int32_t radius = g->columns / 100, limit = (g->columns < g->rows ? g->columns : g->rows) / 2 - 1;
     if (radius > limit) radius = limit;
-    if (radius < 0) radius = 0;
-    size_t columns = (size_t)g->columns;
-    float *half = malloc(columns * (size_t)g->rows * sizeof *half);
-    if (!half) return false;
+    return radius < 0 ? 0 : radius;
+}
+
+/* Sums over the 2 * radius + 1 columns around each texel of a row. */
+static void blur_row(void *user, int32_t row)
+{
+    grid *g = user;
+    int32_t radius = blur_radius(g);
+    const float *in = height_at(g, 0, row);
+    float *out = g->means + (size_t)row * (size_t)g->columns;
+    double sum = 0;
+    for (int32_t i = -radius; i <= radius; i++) sum += (double)in[neighbour(g, i, g->columns)];
+    for (int32_t i = 0; i < g->columns; i++) {
+        out[i] = (float)sum;
+        sum += (double)in[neighbour(g, i + radius + 1, g->columns)] -
+               (double)in[neighbour(g, i - radius, g->columns)];
+    }
+}
+
+enum { BAND = 256 };
+
+/* The same down a band of columns, in place, a row at a time: the rows that leave the window are kept. */
+static void blur_band(void *user, size_t band)
+{
+    const blur_job *job = user;
+    grid *g = job->g;
+    int32_t radius = blur_radius(g), window = 2 * radius + 1;
+    int32_t first = (int32_t)band * BAND, count = g->columns - first < BAND ? g->columns - first : BAND;
+    float *column = job->copy + (size_t)band * BAND * (size_t)g->rows;
+    double sums[BAND] = {0};
     for (int32_t y = 0; y < g->rows; y++)
-        blur_line(g, g->heights + (size_t)y * columns, half + (size_t)y * columns, g->columns, 1, radius);
-    for (int32_t x = 0; x < g->columns; x++) blur_line(g, half + x, g->means + x, g->rows, columns, radius);
-    free(half);
+        memcpy(column + (size_t)y * BAND, g->means + (size_t)y * (size_t)g->columns + first,
+               (size_t)count * sizeof *column);
+    for (int32_t y = -radius; y <= radius; y++)
+        for (int32_t i = 0; i < count; i++)
+            sums[i] += (double)column[(size_t)neighbour(g, y, g->rows) * BAND + (size_t)i];
+    for (int32_t y = 0; y < g->rows; y++) {
+        float *out = g->means + (size_t)y * (size_t)g->columns + first;
+        const float *in = column + (size_t)neighbour(g, y + radius + 1, g->rows) * BAND;
+        const float *gone = column + (size_t)neighbour(g, y - radius, g->rows) * BAND;
+        for (int32_t i = 0; i < count; i++) {
+            out[i] = (float)(sums[i] / ((double)window * window));
+            sums[i] += (double)in[i] - (double)gone[i];
+        }
+    }
+}
+
+static bool blur(demo_scene *scene, grid *g)
+{
+    size_t bands = ((size_t)g->columns + BAND - 1) / BAND;
+    blur_job job = {g, malloc(bands * BAND * (size_t)g->rows * sizeof(float))};
+    if (!job.copy) return false;
+    for_rows(scene, g, g->rows, blur_row);
+    parallel_chunks((int)knurl_context_threads(scene->context), bands, blur_band, &job);
+    free(job.copy);
     return true;
 }
 
@@ -124,8 +172,9 @@ static uint8_t srgb_byte(double x)
     return byte(x <= 0.0031308 ? 12.92 * x : 1.055 * pow(demo_clamp(x, 0, 1), 1 / 2.4) - 0.055);
 }
 
-static void color_row(grid *g, int32_t row)
+static void color_row(void *user, int32_t row)
 {
+    grid *g = user;
     const demo_pattern *pattern = g->pattern;
     int channels = pattern->alpha ? 4 : 3;
     int32_t y = (int32_t)((row + 0.5) * g->rows / g->color_rows);
@@ -152,37 +201,102 @@ static void color_row(grid *g, int32_t row)
     }
 }
 
-static void save(demo_scene *scene, const char *file, int32_t columns, int32_t rows, int channels,
-                 knurl_pixel_format format, const void *samples)
-{
+/* One image file, written while other work goes on. */
+typedef struct save_job {
+    demo_scene *scene;
     char path[4096];
-    demo_scene_path(scene, file, path, sizeof path);
-    if (scene->status != KNURL_OK) return;
+    int32_t columns, rows;
+    int channels;
+    knurl_pixel_format format;
+    const void *samples;
+    knurl_status status;
+    knurl_error error;
+} save_job;
+
+static void save_image(save_job *job)
+{
+    knurl_context *context = job->scene->context;
     knurl_image *image = NULL;
-    scene->status =
-        knurl_image_create(scene->context, columns, rows, channels, format, samples, &image, scene->error);
-    if (scene->status == KNURL_OK)
-        scene->status = knurl_image_save(scene->context, image, path, scene->error);
+    job->status = knurl_image_create(context, job->columns, job->rows, job->channels, job->format,
+                                     job->samples, &image, &job->error);
+    if (job->status == KNURL_OK) job->status = knurl_image_save(context, image, job->path, &job->error);
     knurl_image_release(image);
 }
 
+static void *save_thread(void *argument)
+{
+    save_image(argument);
+    return NULL;
+}
+
+static void save_done(save_job *job)
+{
+    if (job->status != KNURL_OK) demo_scene_fail(job->scene, job->status, "%s", job->error.message);
+}
+
+static save_job save_begin(demo_scene *scene, const char *file, int32_t columns, int32_t rows, int channels,
+                           knurl_pixel_format format, const void *samples)
+{
+    save_job job = {.scene = scene,
+                    .columns = columns,
+                    .rows = rows,
+                    .channels = channels,
+                    .format = format,
+                    .samples = samples};
+    demo_scene_path(scene, file, job.path, sizeof job.path);
+    return job;
+}
+
+static void save_each(void *jobs, size_t i)
+{
+    save_image((save_job *)jobs + i);
+}
+
+static void write_colors(demo_scene *scene, grid *g, const demo_maps *maps)
+{
+    if (!blur(scene, g)) {
+        demo_scene_fail(scene, KNURL_ERROR_MEMORY, "out of memory for %s", maps->color);
+        return;
+    }
+    for_rows(scene, g, g->color_rows, color_row);
+    save_job jobs[2] = {
+        save_begin(scene, maps->color, g->color_columns, g->color_rows, g->pattern->alpha ? 4 : 3,
+                   KNURL_PIXEL_U8, g->colors),
+        save_begin(scene, maps->surface, g->color_columns, g->color_rows, 3, KNURL_PIXEL_U8, g->surfaces)};
+    if (scene->status != KNURL_OK) return;
+    parallel_chunks((int)knurl_context_threads(scene->context), 2, save_each, jobs);
+    for (int i = 0; i < 2; i++) save_done(&jobs[i]);
+}
+
+/* Compressing the heights is one thread's work: colours are made meanwhile. */
 static void write_grid(demo_scene *scene, grid *g, const demo_maps *maps)
 {
     size_t count = (size_t)g->columns * (size_t)g->rows;
     for_rows(scene, g, g->rows, height_row);
     if (g->pattern->octahedral) fold_border(g);
     for (size_t i = 0; i < count; i++) g->samples[i] = (uint16_t)((double)g->heights[i] * 65535 + 0.5);
-    save(scene, maps->height, g->columns, g->rows, 1, KNURL_PIXEL_U16, g->samples);
     scene->texels += count;
-    if (!g->pattern->shade || scene->status != KNURL_OK) return;
-    if (!blur(g)) {
-        demo_scene_fail(scene, KNURL_ERROR_MEMORY, "out of memory for %s", maps->color);
-        return;
-    }
-    for_rows(scene, g, g->color_rows, color_row);
-    save(scene, maps->color, g->color_columns, g->color_rows, g->pattern->alpha ? 4 : 3, KNURL_PIXEL_U8,
-         g->colors);
-    save(scene, maps->surface, g->color_columns, g->color_rows, 3, KNURL_PIXEL_U8, g->surfaces);
+    save_job heights = save_begin(scene, maps->height, g->columns, g->rows, 1, KNURL_PIXEL_U16, g->samples);
+    if (scene->status != KNURL_OK) return;
+    pthread_t thread;
+    bool beside = pthread_create(&thread, NULL, save_thread, &heights) == 0;
+    if (!beside) save_image(&heights);
+    if (g->pattern->shade) write_colors(scene, g, maps);
+    if (beside) pthread_join(thread, NULL);
+    save_done(&heights);
+}
+
+/* --size sets the longer side, --map-size limits it; the other keeps the pattern's shape. */
+static void choose_size(const demo_scene *scene, grid *g)
+{
+    int32_t longer = g->columns > g->rows ? g->columns : g->rows, wanted = longer;
+    if (scene->map_size > 0) wanted = scene->map_size;
+    if (scene->map_limit > 0 && scene->map_limit < wanted) wanted = scene->map_limit;
+    g->columns = (int32_t)((int64_t)g->columns * wanted / longer);
+    g->rows = (int32_t)((int64_t)g->rows * wanted / longer);
+    bool full = g->pattern->full_color;
+    g->color_columns = full ? g->columns : g->columns / 2;
+    g->color_rows = full ? g->rows : g->rows / 2;
 }
 
 demo_maps demo_write_maps(demo_scene *scene, const demo_pattern *pattern, const char *stem)
@@ -193,14 +307,7 @@ demo_maps demo_write_maps(demo_scene *scene, const demo_pattern *pattern, const 
     (void)snprintf(maps.surface, sizeof maps.surface, "%.60s-surface.png", stem);
     if (scene->status != KNURL_OK) return maps;
     grid g = {.pattern = pattern, .columns = pattern->columns, .rows = pattern->rows};
-    if (scene->map_size > 0) {
-        /* --size is the longer side; the other keeps the pattern's shape. */
-        int32_t longer = g.columns > g.rows ? g.columns : g.rows;
-        g.columns = (int32_t)((int64_t)g.columns * scene->map_size / longer);
-        g.rows = (int32_t)((int64_t)g.rows * scene->map_size / longer);
-    }
-    g.color_columns = g.columns / 2;
-    g.color_rows = g.rows / 2;
+    choose_size(scene, &g);
     size_t count = (size_t)g.columns * (size_t)g.rows,
            color_count = (size_t)g.color_columns * (size_t)g.color_rows;
     g.heights = malloc(count * sizeof *g.heights);
@@ -270,31 +377,48 @@ static void sky_radiance(const demo_sky *sky, const double d[3], double out[3])
     }
 }
 
+typedef struct sky_image {
+    const demo_sky *sky;
+    int32_t columns, rows;
+    double radius;
+    float *samples;
+} sky_image;
+
+static void sky_row(void *user, int32_t y)
+{
+    const sky_image *image = user;
+    const demo_sky *sky = image->sky;
+    double polar = (y + 0.5) / image->rows * DEMO_PI, radius = image->radius;
+    for (int32_t x = 0; x < image->columns; x++) {
+        /* u = 0.5 looks along -z, u grows to the right. */
+        double turn = ((x + 0.5) / image->columns - 0.5) * 2 * DEMO_PI, radiance[3];
+        double d[3] = {sin(polar) * sin(turn), cos(polar), -sin(polar) * cos(turn)};
+        sky_radiance(sky, d, radiance);
+        double facing = d[0] * sky->sun[0] + d[1] * sky->sun[1] + d[2] * sky->sun[2];
+        double angle = acos(demo_clamp(facing, -1, 1)), solid = 2 * DEMO_PI * (1 - cos(radius));
+        double disc = demo_step(1.1 * radius, 0.9 * radius, angle) / solid;
+        float *out = image->samples + 3 * ((size_t)y * (size_t)image->columns + (size_t)x);
+        for (int k = 0; k < 3; k++) out[k] = (float)(radiance[k] + disc * sky->sun_irradiance[k]);
+    }
+}
+
 void demo_write_sky(demo_scene *scene, const demo_sky *sky, const char *file)
 {
     if (scene->status != KNURL_OK) return;
-    int32_t columns = scene->map_size > 0 && scene->map_size < 1024 ? scene->map_size : 1024,
-            rows = columns / 2;
-    float *samples = malloc((size_t)columns * (size_t)rows * 3 * sizeof *samples);
-    if (!samples) {
+    int32_t columns = scene->map_size > 0 && scene->map_size < 1024 ? scene->map_size : 1024;
+    if (scene->map_limit > 0 && scene->map_limit < columns) columns = scene->map_limit;
+    sky_image image = {.sky = sky, .columns = columns, .rows = columns / 2};
+    image.radius = fmax(sky->sun_radius * DEMO_PI / 180, 1.5 * DEMO_PI / image.rows);
+    image.samples = malloc((size_t)columns * (size_t)image.rows * 3 * sizeof *image.samples);
+    if (!image.samples) {
         demo_scene_fail(scene, KNURL_ERROR_MEMORY, "out of memory for %s", file);
         return;
     }
-    double radius = fmax(sky->sun_radius * DEMO_PI / 180, 1.5 * DEMO_PI / rows);
-    for (int32_t y = 0; y < rows; y++) {
-        double polar = (y + 0.5) / rows * DEMO_PI;
-        for (int32_t x = 0; x < columns; x++) {
-            /* u = 0.5 looks along -z, u grows to the right. */
-            double turn = ((x + 0.5) / columns - 0.5) * 2 * DEMO_PI, radiance[3];
-            double d[3] = {sin(polar) * sin(turn), cos(polar), -sin(polar) * cos(turn)};
-            sky_radiance(sky, d, radiance);
-            double facing = d[0] * sky->sun[0] + d[1] * sky->sun[1] + d[2] * sky->sun[2];
-            double angle = acos(demo_clamp(facing, -1, 1)), solid = 2 * DEMO_PI * (1 - cos(radius));
-            double disc = demo_step(1.1 * radius, 0.9 * radius, angle) / solid;
-            float *out = samples + 3 * ((size_t)y * (size_t)columns + (size_t)x);
-            for (int k = 0; k < 3; k++) out[k] = (float)(radiance[k] + disc * sky->sun_irradiance[k]);
-        }
+    for_rows(scene, &image, image.rows, sky_row);
+    save_job job = save_begin(scene, file, columns, image.rows, 3, KNURL_PIXEL_F32, image.samples);
+    if (scene->status == KNURL_OK) {
+        save_image(&job);
+        save_done(&job);
     }
-    save(scene, file, columns, rows, 3, KNURL_PIXEL_F32, samples);
-    free(samples);
+    free(image.samples);
 }

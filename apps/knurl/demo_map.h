@@ -24,6 +24,8 @@ struct demo_pattern {
     void (*shade)(const demo_pattern *pattern, double u, double v, const demo_relief *relief,
                   demo_texel *texel);
     int32_t columns, rows; /* of the height map; colours have half as many */
+    int32_t oversample;    /* each height is the mean of so many squared; 0: 1 */
+    bool full_color;       /* colours have as many texels as heights */
     bool octahedral;       /* chart of demo_octahedral: texels on the border lie on the square's edge
                               and are equal where the chart's sides meet */
     bool alpha;

@@ -1,6 +1,7 @@
 /* Low-poly base meshes of the sample scenes. */
 #include "demo_mesh.h"
 
+#include "demo_curve.h"
 #include "demo_noise.h"
 
 #include <stdlib.h>
@@ -128,6 +129,14 @@ void demo_mesh_sphere(demo_mesh *mesh, double radius, int segments, int rings)
     demo_mesh_patch(mesh, &(demo_patch){sphere_at, &radius, segments, rings, true, false});
 }
 
+void demo_latitude_longitude(double u, double v, double direction[3])
+{
+    double turn = 2 * DEMO_PI * u, ring = sin(DEMO_PI * v);
+    direction[0] = ring * sin(turn);
+    direction[1] = cos(DEMO_PI * v);
+    direction[2] = ring * cos(turn);
+}
+
 void demo_octahedral(double u, double v, double direction[3])
 {
     double x = 2 * u - 1, z = 2 * v - 1, y = 1 - fabs(x) - fabs(z);
@@ -142,7 +151,7 @@ void demo_octahedral(double u, double v, double direction[3])
     direction[2] = z / length;
 }
 
-void demo_mesh_octasphere(demo_mesh *mesh, double radius, int n)
+void demo_mesh_ball(demo_mesh *mesh, demo_ball_fn *evaluate, const void *shape, int n)
 {
     uint32_t first = mesh->vertex_count, side = 2 * (uint32_t)n + 1;
     for (int j = 0; j <= 2 * n; j++) {
@@ -155,8 +164,8 @@ void demo_mesh_octasphere(demo_mesh *mesh, double radius, int n)
                 x = folded;
             }
             double length = sqrt((double)(x * x + y * y + z * z));
-            double normal[3] = {x / length, y / length, z / length};
-            double position[3] = {radius * normal[0], radius * normal[1], radius * normal[2]};
+            double direction[3] = {x / length, y / length, z / length}, position[3], normal[3];
+            evaluate(shape, direction, position, normal);
             add_vertex(mesh, position, normal, (double)i / (2 * n), (double)j / (2 * n));
         }
     }
@@ -173,6 +182,19 @@ void demo_mesh_octasphere(demo_mesh *mesh, double radius, int n)
             }
         }
     }
+}
+
+static void ball_at(const void *shape, const double direction[3], double position[3], double normal[3])
+{
+    for (int k = 0; k < 3; k++) {
+        normal[k] = direction[k];
+        position[k] = *(const double *)shape * direction[k];
+    }
+}
+
+void demo_mesh_octasphere(demo_mesh *mesh, double radius, int n)
+{
+    demo_mesh_ball(mesh, ball_at, &radius, n);
 }
 
 static void torus_at(const void *shape, double s, double t, double position[3], double normal[3])
@@ -236,38 +258,13 @@ void demo_mesh_box(demo_mesh *mesh, const demo_box *box)
     }
 }
 
-enum { CURVE_STEPS = 512 };
-
-typedef struct curve {
-    const demo_profile *profile;
-    double length[CURVE_STEPS + 1]; /* arc length up to step i */
-} curve;
-
-/* Catmull-Rom, w in [0, count - 1]; the curve and its derivative. */
-static void curve_point(const demo_profile *profile, double w, double point[2], double tangent[2])
-{
-    int last = profile->count - 1, k = (int)w;
-    if (k >= last) k = last - 1;
-    double x = w - k;
-    const double *p1 = profile->points[k], *p2 = profile->points[k + 1];
-    for (int axis = 0; axis < 2; axis++) {
-        double before = k > 0 ? profile->points[k - 1][axis] : 2 * p1[axis] - p2[axis];
-        double after = k + 2 <= last ? profile->points[k + 2][axis] : 2 * p2[axis] - p1[axis];
-        double m1 = 0.5 * (p2[axis] - before), m2 = 0.5 * (after - p1[axis]), d = p1[axis] - p2[axis];
-        double c3 = 2 * d + m1 + m2, c2 = -3 * d - 2 * m1 - m2;
-        point[axis] = ((c3 * x + c2) * x + m1) * x + p1[axis];
-        tangent[axis] = (3 * c3 * x + 2 * c2) * x + m1;
-    }
-}
-
 static void lathe_at(const void *shape, double s, double t, double position[3], double normal[3])
 {
-    const curve *c = shape;
-    double wanted = t * c->length[CURVE_STEPS], point[2], tangent[2];
-    int k = 0;
-    while (k < CURVE_STEPS - 1 && c->length[k + 1] < wanted) k++;
-    double part = (wanted - c->length[k]) / (c->length[k + 1] - c->length[k]);
-    curve_point(c->profile, (k + part) * (c->profile->count - 1) / CURVE_STEPS, point, tangent);
+    const demo_curve *curve = shape;
+    double point[2], tangent[2];
+    demo_curve_at(curve, demo_curve_parameter(curve, t), point, tangent);
+    /* An end on the axis must be one point, whatever was rounded on the way. */
+    if ((t <= 0 || t >= 1) && fabs(point[0]) < 1e-9 * curve->length[DEMO_CURVE_STEPS]) point[0] = 0;
     double turn = 2 * DEMO_PI * s, speed = sqrt(tangent[0] * tangent[0] + tangent[1] * tangent[1]);
     position[0] = point[0] * sin(turn);
     position[1] = point[1];
@@ -279,13 +276,16 @@ static void lathe_at(const void *shape, double s, double t, double position[3], 
 
 void demo_mesh_lathe(demo_mesh *mesh, const demo_profile *profile)
 {
-    curve c = {.profile = profile};
-    double before[2], point[2], tangent[2];
-    curve_point(profile, 0, before, tangent);
-    for (int k = 1; k <= CURVE_STEPS; k++) {
-        curve_point(profile, (double)k * (profile->count - 1) / CURVE_STEPS, point, tangent);
-        c.length[k] = c.length[k - 1] + hypot(point[0] - before[0], point[1] - before[1]);
-        memcpy(before, point, sizeof before);
+    demo_curve curve = {
+        .points = profile->points[0], .count = profile->count, .width = 2, .axes = 2, .on_axis = true};
+    demo_curve_measure(&curve);
+    demo_mesh_patch(mesh, &(demo_patch){lathe_at, &curve, profile->segments, profile->rings, true, false});
+}
+
+void demo_mesh_scale_texcoords(demo_mesh *mesh, double u, double v)
+{
+    for (uint32_t i = 0; i < mesh->vertex_count; i++) {
+        mesh->texcoords[2 * i] *= (float)u;
+        mesh->texcoords[2 * i + 1] *= (float)v;
     }
-    demo_mesh_patch(mesh, &(demo_patch){lathe_at, &c, profile->segments, profile->rings, true, false});
 }

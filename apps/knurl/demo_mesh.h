@@ -38,6 +38,10 @@ void demo_mesh_sphere(demo_mesh *mesh, double radius, int segments, int rings);
 /* An octahedron divided into 8 n^2 triangles; its chart is the square folded over the octahedron:
  * no poles, and seams only on the square's border, where (0, v) meets (0, 1 - v) and so on. */
 void demo_mesh_octasphere(demo_mesh *mesh, double radius, int n);
+/* Point and unit normal of a shape seen from its middle along a unit direction. */
+typedef void demo_ball_fn(const void *shape, const double direction[3], double position[3], double normal[3]);
+/* The octasphere's lattice and chart on any such shape. */
+void demo_mesh_ball(demo_mesh *mesh, demo_ball_fn *evaluate, const void *shape, int n);
 /* Around the y axis; u around the axis, v around the tube, v = 0 outside and 0.25 on top. */
 void demo_mesh_torus(demo_mesh *mesh, double radius, double tube, int segments, int sides);
 
@@ -52,15 +56,20 @@ void demo_mesh_box(demo_mesh *mesh, const demo_box *box);
 
 /* A smooth curve through `count` points (radius, y), turned around the y axis. Outside is to the
  * right of the way the curve runs: up for an outer wall, down for an inner one. v is the arc length
- * along the curve, u runs around the axis. */
+ * along the curve, u runs around the axis. An end with radius 0 is closed and smooth. */
 typedef struct demo_profile {
     const double (*points)[2];
-    int count; /* 3 to 16 */
+    int count; /* 3 or more */
     int segments, rings;
 } demo_profile;
 void demo_mesh_lathe(demo_mesh *mesh, const demo_profile *profile);
 
-/* Direction of a point of the octahedral chart, and back. */
+/* Multiplies all texture coordinates: tiles of a mesh's own. */
+void demo_mesh_scale_texcoords(demo_mesh *mesh, double u, double v);
+
+/* Direction of a point of the octahedral chart. */
 void demo_octahedral(double u, double v, double direction[3]);
+/* The same of demo_mesh_sphere's chart. */
+void demo_latitude_longitude(double u, double v, double direction[3]);
 
 #endif

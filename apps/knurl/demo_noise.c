@@ -198,3 +198,31 @@ demo_cell demo_cells_at(const demo_cells *cells, double u, double v)
     double border = sum > 0 ? -cells->corner * log(sum) : 14 * cells->corner;
     return (demo_cell){.border = border, .x = -px, .y = -py, .id = ids[nearest]};
 }
+
+demo_cell3 demo_cells3_at(const double p[3], uint32_t seed)
+{
+    int32_t base[3];
+    double best = INFINITY, second = INFINITY;
+    uint32_t id = 0;
+    for (int k = 0; k < 3; k++) base[k] = lower(p[k]);
+    for (int n = 0; n < 27; n++) {
+        int32_t cell[3] = {base[0] + n % 3 - 1, base[1] + n / 3 % 3 - 1, base[2] + n / 9 - 1};
+        uint32_t sum = seed * 0x27d4eb2fu;
+        for (int k = 0; k < 3; k++) sum += (uint32_t)cell[k] * axis_factor[k];
+        /* Ten bits for each axis. */
+        uint32_t hash = finish(sum);
+        double squared = 0;
+        for (int k = 0; k < 3; k++) {
+            double d = cell[k] + ((hash >> (10 * k)) & 1023) / 1023.0 - p[k];
+            squared += d * d;
+        }
+        if (squared < best) {
+            second = best;
+            best = squared;
+            id = hash;
+        } else if (squared < second) {
+            second = squared;
+        }
+    }
+    return (demo_cell3){sqrt(best), sqrt(second), id};
+}

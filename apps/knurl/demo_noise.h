@@ -99,4 +99,12 @@ typedef struct demo_cell {
 /* The cell at (u, v), which has period 1. */
 demo_cell demo_cells_at(const demo_cells *cells, double u, double v);
 
+typedef struct demo_cell3 {
+    double nearest, second; /* distances to the two nearest points, in cells */
+    uint32_t id;            /* hash of the nearest one's cell */
+} demo_cell3;
+
+/* Worley's cells in space: one point in each unit cube. */
+demo_cell3 demo_cells3_at(const double p[3], uint32_t seed);
+
 #endif

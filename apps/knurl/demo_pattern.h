@@ -24,4 +24,33 @@ demo_pattern demo_moon(uint32_t seed);   /* octahedral: craters upon craters */
 demo_pattern demo_earth(uint32_t seed);  /* octahedral: seas, mountains, ice */
 demo_pattern demo_urchin(uint32_t seed); /* octahedral: sharp cones */
 
+/* Bench scenes. Balls with poles: heights are constant there. */
+demo_pattern demo_asteroid(uint32_t seed);
+demo_pattern demo_alien(uint32_t seed);   /* bands of plates with eyes; a tile spans one band */
+demo_pattern demo_leather(uint32_t seed); /* grain and stitched seams */
+demo_pattern demo_panels(uint32_t seed);  /* a machine's hull */
+/* Octahedral. */
+demo_pattern demo_reptile(uint32_t seed); /* scales that follow the creature's head */
+
+/* One tile that is the same when turned half round, for tiling the octahedral chart. */
+demo_pattern demo_cloth(uint32_t seed);
+/* Tiles. */
+demo_pattern demo_plates(uint32_t seed);   /* hammered plates, rivets */
+demo_pattern demo_filigree(uint32_t seed); /* leaves and tendrils; to be mirrored */
+demo_pattern demo_rooftiles(uint32_t seed);
+demo_pattern demo_sand(uint32_t seed);
+demo_pattern demo_tread(uint32_t seed);    /* v across the tire */
+demo_pattern demo_sidewall(uint32_t seed); /* v from the bead to the shoulder */
+
+/* Whole objects; v runs along the profile. */
+demo_pattern demo_diver(uint32_t seed);    /* a diving helmet's dome and collar */
+demo_pattern demo_cutglass(uint32_t seed); /* a tumbler's outside; its inside is at 0.5 */
+demo_pattern demo_stump(uint32_t seed);    /* bark, then the cut */
+demo_pattern demo_bamboo(uint32_t seed);   /* a dragon's joints, scales and belly */
+
+/* Height fields. */
+demo_pattern demo_lattice(uint32_t seed);
+demo_pattern demo_hills(uint32_t seed);
+demo_pattern demo_needles(uint32_t seed);
+
 #endif

@@ -8,13 +8,12 @@ static void scaled(const double d[3], double scale, double shift, double out[3])
     for (int k = 0; k < 3; k++) out[k] = scale * d[k] + shift;
 }
 
-/* Same axes as demo_mesh_sphere. */
-static void sphere_direction(double u, double v, double d[3])
+static void direction_at(const demo_pattern *p, double u, double v, double d[3])
 {
-    double turn = 2 * DEMO_PI * u, ring = sin(DEMO_PI * v);
-    d[0] = ring * sin(turn);
-    d[1] = cos(DEMO_PI * v);
-    d[2] = ring * cos(turn);
+    if (p->octahedral)
+        demo_octahedral(u, v, d);
+    else
+        demo_latitude_longitude(u, v, d);
 }
 
 enum { WAVES = 18, WAVE_NUMBER = 26 };
@@ -34,7 +33,7 @@ static double furrows(const demo_pattern *p, const double d[3])
 static double coral_height(const demo_pattern *p, double u, double v)
 {
     double d[3], q[3], fine[3];
-    sphere_direction(u, v, d);
+    demo_latitude_longitude(u, v, d);
     scaled(d, 2.5, 3, q);
     for (int k = 0; k < 3; k++)
         fine[k] = d[k] + 0.02 * demo_noise3((double[3]){q[k], q[(k + 1) % 3], q[(k + 2) % 3]}, p->seed);
@@ -51,7 +50,7 @@ static double coral_height(const demo_pattern *p, double u, double v)
 static void coral_shade(const demo_pattern *p, double u, double v, const demo_relief *r, demo_texel *t)
 {
     double d[3], q[3];
-    sphere_direction(u, v, d);
+    demo_latitude_longitude(u, v, d);
     scaled(d, 4, 1, q);
     double mottle = demo_fbm3(q, 5, 0.55, p->seed + 3);
     demo_set_color(t->color, 0.10, 0.19, 0.13);
@@ -140,14 +139,15 @@ static double moon_relief(const demo_pattern *p, const double d[3])
 static double moon_height(const demo_pattern *p, double u, double v)
 {
     double d[3];
-    demo_octahedral(u, v, d);
-    return 0.62 + 1.9 * moon_relief(p, d);
+    direction_at(p, u, v, d);
+    double h = 0.62 + 1.9 * moon_relief(p, d);
+    return p->octahedral ? h : demo_mix(0.62, h, demo_step(0.01, 0.03, demo_min(v, 1 - v)));
 }
 
 static void moon_shade(const demo_pattern *p, double u, double v, const demo_relief *r, demo_texel *t)
 {
     double d[3], q[3];
-    demo_octahedral(u, v, d);
+    direction_at(p, u, v, d);
     scaled(d, 1.6, 2, q);
     double mare = demo_step(0.0, 0.35, demo_fbm3(q, 7, 0.55, p->seed + 5));
     scaled(d, 30, 0, q);
@@ -166,6 +166,21 @@ demo_pattern demo_moon(uint32_t seed)
                           .rows = 1024,
                           .octahedral = true,
                           .seed = seed};
+}
+
+/* The moon's craters with poles, darker. */
+static void asteroid_shade(const demo_pattern *p, double u, double v, const demo_relief *r, demo_texel *t)
+{
+    moon_shade(p, u, v, r, t);
+    double dust = demo_step(0.45, 0.75, r->height);
+    for (int k = 0; k < 3; k++) t->color[k] *= 0.55 + 0.35 * dust;
+    t->color[2] *= 0.86;
+}
+
+demo_pattern demo_asteroid(uint32_t seed)
+{
+    return (demo_pattern){
+        .height = moon_height, .shade = asteroid_shade, .columns = 4096, .rows = 4096, .seed = seed};
 }
 
 static double earth_level(const demo_pattern *p, const double d[3])

@@ -6,17 +6,49 @@
 #include <string.h>
 
 const demo_entry demo_entries[] = {
-    {"gallery", "a courtyard of displaced things: start here", demo_scene_gallery},
-    {"torus", "knurled steel ring; closed, its map repeats both ways", demo_scene_torus},
-    {"plane", "mountains and a lake on two triangles, 6 km wide", demo_scene_plane},
-    {"sphere", "brain coral on 900 triangles, latitude-longitude chart", demo_scene_sphere},
-    {"box", "creased and smooth boxes: carved, hammered, and one that comes apart", demo_scene_box},
-    {"cobblestones", "a street of setts, one map tiled 12 x 12", demo_scene_cobblestones},
-    {"basket", "woven willow on a turned bowl", demo_scene_basket},
-    {"spikes", "sea urchin: displacement as large as the ball under it", demo_scene_spikes},
-    {"chainmail", "draped mail, its holes cut out by alpha", demo_scene_chainmail},
-    {"planet", "seas, mountains and a cratered moon, kilometres wide", demo_scene_planet},
-    {"glass", "a closed slab of wavy cast glass", demo_scene_glass},
+    {"gallery", "a courtyard of displaced things: start here", demo_scene_gallery, NULL},
+    {"torus", "knurled steel ring; closed, its map repeats both ways", demo_scene_torus, NULL},
+    {"plane", "mountains and a lake on two triangles, 6 km wide", demo_scene_plane, NULL},
+    {"sphere", "brain coral on 900 triangles, latitude-longitude chart", demo_scene_sphere, NULL},
+    {"box", "creased and smooth boxes: carved, hammered, and one that comes apart", demo_scene_box, NULL},
+    {"cobblestones", "a street of setts, one map tiled 12 x 12", demo_scene_cobblestones, NULL},
+    {"basket", "woven willow on a turned bowl", demo_scene_basket, NULL},
+    {"spikes", "sea urchin: displacement as large as the ball under it", demo_scene_spikes, NULL},
+    {"chainmail", "draped mail, its holes cut out by alpha", demo_scene_chainmail, NULL},
+    {"planet", "seas, mountains and a cratered moon, kilometres wide", demo_scene_planet, NULL},
+    {"glass", "a closed slab of wavy cast glass", demo_scene_glass, NULL},
+
+    {"alien-sphere", "eyes and plates around a ball, 6 x 8 tiles", demo_scene_alien_sphere, "rmip"},
+    {"wicker-basket", "woven willow, 5 x 5 tiles, with a handle", demo_scene_wicker_basket, "rmip"},
+    {"creature", "a horned reptile's head on a fine mesh", demo_scene_creature, "rmip"},
+    {"diving-helmet", "a copper helmet whose windows and bolts are in the map", demo_scene_diving_helmet,
+     "rmip"},
+    {"medieval-helmet", "hammered and riveted plates, 5 x 5 tiles", demo_scene_medieval_helmet, "rmip"},
+    {"elven-armor", "filigree on a breastplate, 2 x 2 mirrored tiles", demo_scene_elven_armor, "rmip"},
+    {"ninja-head", "a hood of coarse cloth, 5 x 5 tiles", demo_scene_ninja_head, "rmip"},
+    {"terracotta-roof", "barrel tiles on 128 triangles, 2 x 2 tiles", demo_scene_terracotta_roof, "rmip"},
+    {"desert-tire", "tread, sidewall and sand: three maps, 6 x 1 and 25 x 25 tiles", demo_scene_desert_tire,
+     "rmip"},
+    {"rough-glass", "a tumbler of cut glass", demo_scene_rough_glass, "rmip"},
+
+    {"asteroid", "craters on 480 triangles", demo_scene_asteroid, "pdm"},
+    {"draped-mail", "mail thrown over a ball, its holes cut out by alpha", demo_scene_draped_mail, "pdm"},
+    {"leather-sphere", "stitched leather", demo_scene_leather_sphere, "pdm"},
+    {"orb", "panels of a machine, an 8k map", demo_scene_orb, "pdm"},
+    {"tree-stump", "bark and year rings", demo_scene_tree_stump, "pdm"},
+    {"bamboo-dragon", "a long dragon jointed like bamboo", demo_scene_bamboo_dragon, "pdm"},
+
+    {"terrain-32", "mountains on two triangles, 32 x 32 texels", demo_scene_terrain, "baboud"},
+    {"terrain-64", "the same, 64 x 64", demo_scene_terrain, "baboud"},
+    {"terrain-128", "the same, 128 x 128", demo_scene_terrain, "baboud"},
+    {"terrain-256", "the same, 256 x 256", demo_scene_terrain, "baboud"},
+    {"grid-32", "a lattice of bars on two triangles, 32 x 32 texels", demo_scene_grid, "baboud"},
+    {"grid-64", "the same, 64 x 64", demo_scene_grid, "baboud"},
+    {"grid-128", "the same, 128 x 128", demo_scene_grid, "baboud"},
+    {"grid-256", "the same, 256 x 256", demo_scene_grid, "baboud"},
+
+    {"relief-simple", "smooth hills on two triangles", demo_scene_relief_simple, "kolb"},
+    {"relief-spikes", "a field of needles on two triangles", demo_scene_relief_spikes, "kolb"},
 };
 const int demo_entry_count = sizeof demo_entries / sizeof demo_entries[0];
 
@@ -78,13 +110,39 @@ void demo_add_sky(demo_scene *scene, const demo_sky *sky)
     demo_add_environment(scene, "sky.exr", 1, 0);
 }
 
+demo_material demo_begin_material(demo_scene *scene, const char *name, const demo_pattern *pattern,
+                                  demo_maps *maps)
+{
+    *maps = demo_write_maps(scene, pattern, name);
+    demo_material material = demo_material_default(name);
+    if (pattern->shade)
+        demo_use_maps(&material, maps);
+    else
+        material.height_map = maps->height;
+    if (pattern->octahedral) material.wrap = DEMO_CLAMP;
+    return material;
+}
+
+void demo_add_thing(demo_scene *scene, const char *name, demo_mesh *mesh, int material,
+                    const demo_place *place)
+{
+    demo_add_node(scene, name, demo_add_mesh(scene, name, mesh, material), place);
+}
+
+int demo_add_paint(demo_scene *scene, const char *name, const double color[3], double metallic,
+                   double roughness)
+{
+    demo_material material = demo_material_default(name);
+    memcpy(material.color, color, 3 * sizeof *color);
+    material.metallic = metallic;
+    material.roughness = roughness;
+    return demo_add_material(scene, &material);
+}
+
 void demo_add_floor(demo_scene *scene, double y, double size, const double color[3], double roughness)
 {
-    demo_material material = demo_material_default("floor");
-    memcpy(material.color, color, 3 * sizeof *color);
-    material.roughness = roughness;
     demo_mesh mesh = {0};
     demo_mesh_plane(&mesh, size, size, 1, 1);
-    demo_add_node(scene, "floor", demo_add_mesh(scene, "floor", &mesh, demo_add_material(scene, &material)),
-                  &(demo_place){.position = {0, y, 0}});
+    demo_add_thing(scene, "floor", &mesh, demo_add_paint(scene, "floor", color, 0, roughness),
+                   &(demo_place){.position = {0, y, 0}});
 }

@@ -10,20 +10,18 @@
 static int add_material(demo_scene *scene, const char *name, demo_pattern pattern, double factor,
                         double offset, double tile_u, double tile_v)
 {
-    demo_maps maps = demo_write_maps(scene, &pattern, name);
-    demo_material material = demo_material_default(name);
-    demo_use_maps(&material, &maps);
+    demo_maps maps;
+    demo_material material = demo_begin_material(scene, name, &pattern, &maps);
     material.factor = factor;
     material.offset = offset;
     material.tile[0] = tile_u;
     material.tile[1] = tile_v;
-    if (pattern.octahedral) material.wrap = DEMO_CLAMP;
     return demo_add_material(scene, &material);
 }
 
 static void add(demo_scene *scene, const char *name, demo_mesh *mesh, int material, demo_place place)
 {
-    demo_add_node(scene, name, demo_add_mesh(scene, name, mesh, material), &place);
+    demo_add_thing(scene, name, mesh, material, &place);
 }
 
 static void add_courtyard(demo_scene *scene)
