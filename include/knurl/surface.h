@@ -68,8 +68,9 @@ typedef struct knurl_hit {
     double t;           /* smallest in [tmin, tmax]; meaningful only if triangle != KNURL_NO_HIT */
     double position[3]; /* on the surface, from (a, b), not from the ray */
     double ng[3];       /* unit S_a x S_b; not turned towards the ray */
-    double ns[3];       /* unit shading normal: PDM 2025 Eq. 10 on displaced meshes, the
-                           interpolated vertex normal on plain ones */
+    double ns[3];       /* unit shading normal: PDM 2025 Eq. 10 on displaced meshes (with directions,
+                           S_a x S_b with the same smooth gradient of h), the interpolated vertex
+                           normal on plain ones */
     double a, b;        /* barycentrics of vertices 1 and 2 */
     double uv[2];       /* map coordinates after the uv transform, before wrapping */
     double st[2];       /* the mesh's own texture coordinates */

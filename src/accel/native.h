@@ -10,8 +10,7 @@
 knurl_status accel_native_create(accel_device *device, const native_mesh *mesh, const char *what,
                                  accel_bvh **bvh, knurl_error *error);
 
-/* Nearest facet of the segment up to tmax, as precise as floats about the object's centre are. Where the ray
- * meets the edge of facets, always the same one of them. */
+/* Nearest facet of the segment up to tmax, as precise as floats about the object's centre are. */
 bool accel_native_intersect(const accel_bvh *bvh, const accel_segment *segment, double tmax, native_hit *hit);
 bool accel_native_occluded(const accel_bvh *bvh, const accel_segment *segment, double tmax);
 

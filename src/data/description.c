@@ -30,6 +30,7 @@ void description_clear_mesh(knurl_context *context, knurl_description_mesh *mesh
     knurl_free(context, mesh->positions);
     knurl_free(context, mesh->normals);
     knurl_free(context, mesh->texcoords);
+    knurl_free(context, mesh->directions);
     knurl_free(context, mesh->triangles);
     *mesh = (knurl_description_mesh){.material = -1};
 }
@@ -202,6 +203,22 @@ static size_t first_not_finite(const float *values, size_t count)
     return count;
 }
 
+/* There is no length to fall back on, so a bad direction is an error and not a warning as with normals. */
+static knurl_status check_directions(const knurl_description *d, uint32_t index, knurl_error *error)
+{
+    const knurl_description_mesh *m = &d->meshes[index];
+    for (size_t i = 0; m->directions && i < m->vertex_count; i++) {
+        const float *p = m->directions + 3 * i;
+        bool finite = isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
+        if (finite && (p[0] != 0.0f || p[1] != 0.0f || p[2] != 0.0f)) continue;
+        return knurl_fail(
+            error, KNURL_ERROR_INPUT,
+            "%s: mesh %u (\"%s\"), vertex %zu: direction is (%g, %g, %g), expected finite numbers, not all 0",
+            d->path, index, m->name ? m->name : "", i, (double)p[0], (double)p[1], (double)p[2]);
+    }
+    return KNURL_OK;
+}
+
 static knurl_status check_mesh(knurl_description *d, uint32_t index, knurl_error *error)
 {
     knurl_description_mesh *m = &d->meshes[index];
@@ -227,6 +244,8 @@ static knurl_status check_mesh(knurl_description *d, uint32_t index, knurl_error
         knurl_free(d->context, m->normals);
         m->normals = NULL;
     }
+    knurl_status status = check_directions(d, index, error);
+    if (status != KNURL_OK) return status;
     for (size_t i = 0; i < 3 * (size_t)m->triangle_count; i++) {
         if (m->triangles[i] < m->vertex_count) continue;
         return knurl_fail(error, KNURL_ERROR_INPUT,

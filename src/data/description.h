@@ -27,8 +27,8 @@ void description_warn(knurl_description *d, const char *format, ...) KNURL_PRINT
 /* Frees and clears what a mesh owns. */
 void description_clear_mesh(knurl_context *context, knurl_description_mesh *mesh);
 
-/* Last step of every reader: refuses positions and texture coordinates that are not finite and
- * indices out of range, drops normals that are not finite, and gives
+/* Last step of every reader: refuses positions and texture coordinates that are not finite, directions
+ * that are zero or not finite, and indices out of range, drops normals that are not finite, and gives
  * meshes with material -1 a default one, appended to the materials. */
 knurl_status description_finish(knurl_description *d, knurl_error *error);
 

@@ -10,8 +10,8 @@ enum { MODE_TRIANGLES = 4, MODE_STRIP = 5, MODE_FAN = 6, UNSIGNED_INT = 5125, FL
 
 /* What a primitive is made of, before vertices that no triangle uses are left out. */
 typedef struct primitive {
-    gltf_accessor position, normal, texcoord, index;
-    bool has_normal, has_texcoord, has_index;
+    gltf_accessor position, normal, texcoord, direction, index;
+    bool has_normal, has_texcoord, has_direction, has_index;
     uint64_t mode;
     uint32_t *corners; /* 3 per triangle */
     size_t triangle_count;
@@ -46,6 +46,15 @@ static void check_index_type(gltf_reader *g, const gltf_at *at, const gltf_acces
               "componentType of the accessor is %u, expected 5121, 5123 or 5125", a->type);
 }
 
+/* Our own attribute, so that no other type need be read: lengths count, and integers would round them. */
+static void check_direction_type(gltf_reader *g, const gltf_at *attributes, const gltf_accessor *a)
+{
+    if (a->type == FLOAT) return;
+    gltf_at place = gltf_member(attributes, "_DIRECTION");
+    gltf_fail(&g->report, &place, KNURL_ERROR_INPUT, "componentType of the accessor is %u, expected 5126",
+              a->type);
+}
+
 static void open_primitive(gltf_reader *g, const gltf_at *at, uint32_t uv_set, primitive *p)
 {
     gltf_report *r = &g->report;
@@ -61,6 +70,8 @@ static void open_primitive(gltf_reader *g, const gltf_at *at, uint32_t uv_set, p
         (void)snprintf(key, sizeof key, "TEXCOORD_0");
     }
     p->has_texcoord = open_member(g, &attributes, key, 2, p->position.count, &p->texcoord);
+    p->has_direction = open_member(g, &attributes, "_DIRECTION", 3, p->position.count, &p->direction);
+    if (p->has_direction) check_direction_type(g, &attributes, &p->direction);
     p->has_index = open_member(g, at, "indices", 1, 0, &p->index);
     if (p->has_index) check_index_type(g, at, &p->index);
 }
@@ -139,8 +150,8 @@ static float *used_rows(gltf_reader *g, const gltf_accessor *a, const uint32_t *
  * set of vertices would else carry all of it each. */
 static void fill_mesh(gltf_reader *g, const gltf_at *at, primitive *p, knurl_description_mesh *mesh)
 {
-    size_t n = p->position.count;
-    if (!gltf_take(g, at, n * 8 * sizeof(float))) return;
+    size_t n = p->position.count, row = (p->has_direction ? 11 : 8) * sizeof(float);
+    if (!gltf_take(g, at, n * row)) return;
     uint32_t *number = knurl_alloc_array(g->context, n, sizeof *number);
     if (!number) {
         gltf_fail_memory(g, at, n * sizeof *number);
@@ -159,12 +170,14 @@ static void fill_mesh(gltf_reader *g, const gltf_at *at, primitive *p, knurl_des
     mesh->positions = used_rows(g, &p->position, number, used);
     if (p->has_normal) mesh->normals = used_rows(g, &p->normal, number, used);
     if (p->has_texcoord) mesh->texcoords = used_rows(g, &p->texcoord, number, used);
-    if (!mesh->positions || (p->has_normal && !mesh->normals) || (p->has_texcoord && !mesh->texcoords))
-        gltf_fail_memory(g, at, n * 8 * sizeof(float));
+    if (p->has_direction) mesh->directions = used_rows(g, &p->direction, number, used);
+    if (!mesh->positions || (p->has_normal && !mesh->normals) || (p->has_texcoord && !mesh->texcoords) ||
+        (p->has_direction && !mesh->directions))
+        gltf_fail_memory(g, at, n * row);
     knurl_free(g->context, number);
     /* What unused vertices would have taken was not taken after all; one byte each pays for the time
      * that went into them. */
-    g->budget += (n - used) * (8 * sizeof(float) - 1);
+    g->budget += (n - used) * (row - 1);
 }
 
 static void warn_left_out(gltf_reader *g, const gltf_at *at, bool *warned, const char *what)

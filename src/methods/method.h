@@ -32,7 +32,7 @@ typedef struct method {
     bool (*intersect)(const void *data, const method_query *query);
     uint64_t (*bytes)(const void *data);
     void (*destroy)(const shell_space *space, void *data);
-    /* KNURL_METHOD_NATIVE only: the facets, and where a hit on them is, b1, b2 and 1 - b1 - b2 within [0, 1]. */
+    /* KNURL_METHOD_NATIVE only: the facets, and where a hit on them is (b1, b2, 1 - b1 - b2 in [0, 1]). */
     const native_mesh *(*native)(const void *data);
     void (*locate)(const void *data, const native_hit *hit, native_place *place);
 } method;

@@ -152,6 +152,7 @@ static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *
     space->wrap_v = d->wrap_v;
     space->unnormalised =
         d->unnormalised || def->mesh.directions || (surface->method->flags & KNURL_METHOD_UNNORMALISED);
+    space->directions = def->mesh.directions != NULL;
     set_uv_transform(d, space->uv);
     if (d->map)
         space->map = knurl_heightmap_retain(d->map);

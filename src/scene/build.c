@@ -40,7 +40,9 @@ static knurl_status get_map(builder *b, int32_t image, knurl_heightmap **map, kn
                           d->image_count);
     if (!b->maps[image]) {
         knurl_image *pixels = NULL;
+        double start = knurl_seconds();
         knurl_status status = knurl_description_load_image(d, image, &pixels, error);
+        if (b->def->image_seconds) *b->def->image_seconds += knurl_seconds() - start;
         if (status != KNURL_OK) return status;
         knurl_heightmap_def def = b->def->heightmap;
         def.image = pixels;
@@ -101,6 +103,7 @@ static knurl_status add_mesh(builder *b, uint32_t number, knurl_error *error)
         .positions = mesh->positions,
         .normals = mesh->normals,
         .texcoords = mesh->texcoords,
+        .directions = mesh->directions,
         .vertex_count = mesh->vertex_count,
         .triangles = mesh->triangles,
         .triangle_count = mesh->triangle_count,
@@ -163,6 +166,7 @@ knurl_status knurl_scene_build(const knurl_description *description, const knurl
         def->heightmap.cookie != KNURL_COOKIE)
         return knurl_fail(error, KNURL_ERROR_ARGUMENT,
                           "build definition was not made by knurl_build_def_default()");
+    if (def->image_seconds) *def->image_seconds = 0.0;
     knurl_context *context = description->context;
     builder b = {.description = description, .def = def};
     size_t bytes = (size_t)description->image_count * sizeof(knurl_heightmap *);

@@ -89,7 +89,15 @@ static vec3 smooth_normal(const shell_space *space, const height_lod *lod, const
     double hy = height_anywhere(space, lod, f, root->x, root->y + 0.5) -
                 height_anywhere(space, lod, f, root->x, root->y - 0.5);
     double ha = hx * f->xe + hy * f->ye, hb = hx * f->xf + hy * f->yf;
-    vec3 unit = v3_normalize(p->n), base = v3_cross(p->va, p->vb);
+    vec3 base = v3_cross(p->va, p->vb);
+    if (space->directions) {
+        /* S_a x S_b with the smooth gradient. Eq. 10 takes N for the normal of a smooth base, but directions
+         * only say where heights point: in a frustum they lean over by half its angle. */
+        vec3 tilt = v3_add(v3_scale(v3_cross(p->va, p->n), hb), v3_scale(v3_cross(p->n, p->vb), ha));
+        vec3 n = v3_normalize(v3_add(base, tilt));
+        return v3_dot(n, n) > 0.0 ? n : ng;
+    }
+    vec3 unit = v3_normalize(p->n);
     double area = v3_dot(base, unit);
     if (!(fabs(area) > 1e-6 * v3_length(p->va) * v3_length(p->vb))) return ng;
     vec3 gradient = v3_add(v3_scale(v3_cross(p->va, unit), hb), v3_scale(v3_cross(unit, p->vb), ha));

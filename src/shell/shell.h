@@ -43,6 +43,7 @@ typedef struct shell_space {
     knurl_wrap wrap_u, wrap_v;
     double uv[6]; /* u = uv[0] s + uv[1] t + uv[2], v = uv[3] s + uv[4] t + uv[5] */
     bool unnormalised;
+    bool directions;   /* N was given as directions, which need not be normals of the base at all */
     double texel_size; /* object-space length of a level 0 texel, area mean */
 } shell_space;
 

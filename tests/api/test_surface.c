@@ -240,6 +240,8 @@ static void directions_make_a_frustum(void **state)
         knurl_hit hit = {.triangle = KNURL_NO_HIT};
         assert_true(knurl_surface_intersect(surface, 0, &ray, &hit));
         assert_true(fabs(hit.t - 1.0) < 1e-6 && fabs(hit.a - b1) < 1e-6 && fabs(hit.b - b2) < 1e-6);
+        /* Parallel to the base, however far the directions lean over. */
+        assert_true(fabs(fabs(hit.ng[1]) - 1.0) < 1e-6 && fabs(fabs(hit.ns[1]) - 1.0) < 1e-6);
     }
     knurl_surface_release(surface);
     directions[3] = directions[4] = directions[5] = 0.0f;

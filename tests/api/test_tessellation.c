@@ -460,6 +460,43 @@ static void test_any_number_of_threads(void **state)
     truth_scene_free(&scene);
 }
 
+/* A flat square of 2 x 256^2 facets, all of whose vertices are rays' exact places: each ray meets up to six
+ * facets at one t. */
+static void test_any_number_of_threads_at_ties(void **state)
+{
+    (void)state;
+    static const float positions[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0},
+                       normals[] = {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1},
+                       texcoords[] = {0, 0, 1, 0, 1, 1, 0, 1};
+    static const uint32_t triangles[] = {0, 1, 2, 0, 2, 3};
+    oracle_def def = {.positions = positions, .normals = normals, .texcoords = texcoords, .vertex_count = 4};
+    def.triangles = triangles;
+    def.triangle_count = 2;
+    static uint8_t zeros[256 * 256];
+    def.samples = zeros;
+    def.width = def.height = 256;
+    def.format = ORACLE_U8;
+    def.uv_scale[0] = def.uv_scale[1] = 1.0;
+    for (int p = 0; p < 3; p++) {
+        truth_scene scene = {.def = def};
+        traced one = make_facets(&scene, PRIMITIVES[p], 1.0, 1),
+               more = make_facets(&scene, PRIMITIVES[p], 1.0, 5);
+        for (int i = 1; i < 256; i++)
+            for (int j = 1; j < 256; j++) {
+                const double from[3] = {i / 256.0, j / 256.0, 1.0}, down[3] = {0.0, 0.0, -1.0};
+                knurl_ray ray = knurl_ray_make(from, down);
+                knurl_hit a, b;
+                memset(&a, 0, sizeof a);
+                memset(&b, 0, sizeof b);
+                assert_true(knurl_scene_intersect(one.scene, &ray, &a));
+                assert_true(knurl_scene_intersect(more.scene, &ray, &b));
+                assert_memory_equal(&a, &b, sizeof a);
+            }
+        traced_free(&one);
+        traced_free(&more);
+    }
+}
+
 /* ---- In a scene ------------------------------------------------------------------------------- */
 
 static void test_instances_masks_and_memory(void **state)
@@ -651,6 +688,7 @@ int main(void)
         cmocka_unit_test(test_hits_converge),
         cmocka_unit_test(test_occluded_is_intersect),
         cmocka_unit_test(test_any_number_of_threads),
+        cmocka_unit_test(test_any_number_of_threads_at_ties),
         cmocka_unit_test(test_instances_masks_and_memory),
         cmocka_unit_test(test_one_shell_is_the_exact_surface),
         cmocka_unit_test(test_budget),

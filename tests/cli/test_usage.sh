@@ -6,7 +6,7 @@ expect 0 "$knurl" --version
 grep -qE '^knurl [0-9]+\.[0-9]+\.[0-9]+$' stdout.txt || fail "version is not 'knurl X.Y.Z'"
 
 expect 0 "$knurl" --help
-for command in render trace info compare demo methods help; do
+for command in render trace info compare bench demo methods help; do
     expect_text stdout.txt "  $command "
     expect 0 "$knurl" help "$command"
     [ -s stdout.txt ] || fail "no help on $command"
@@ -17,7 +17,7 @@ for command in render trace info compare demo methods help; do
     }
     expect 0 "$knurl" --help
 done
-for command in render trace info compare; do
+for command in render trace info compare bench; do
     expect 0 "$knurl" "$command" --help
     expect_text stdout.txt "Usage: knurl $command "
     expect_text stdout.txt "Examples:"
