@@ -142,6 +142,7 @@ static knurl_status write_guarded(png_job *job)
     png_set_IHDR(job->png, job->info, (png_uint_32)image->width, (png_uint_32)image->height,
                  image->format == KNURL_PIXEL_U16 ? 16 : 8, types[image->channels], PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_compression_level(job->png, 3); /* files grow by a few per cent, and take half the time */
     png_write_info(job->png, job->info);
     if (image->format == KNURL_PIXEL_U16 && image_little_endian()) png_set_swap(job->png);
     for (int32_t y = 0; y < image->height; y++) png_write_row(job->png, image_row_const(image, y));

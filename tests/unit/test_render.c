@@ -130,8 +130,8 @@ static void fixture_build(fixture *f)
     knurl_status status = knurl_scene_create(f->context, &f->scene, &error);
     for (uint32_t i = 0; status == KNURL_OK && i < f->description.mesh_count; i++) {
         const knurl_description_mesh *m = &f->meshes[i];
-        knurl_mesh_view view = {m->positions,    m->normals,   NULL,
-                                m->vertex_count, m->triangles, m->triangle_count, NULL};
+        knurl_mesh_view view = {m->positions, m->normals,        NULL, m->vertex_count,
+                                m->triangles, m->triangle_count, NULL};
         uint32_t object;
         status = knurl_scene_add_mesh(f->scene, &view, &object, &error);
     }
