@@ -30,6 +30,7 @@ typedef struct method {
     knurl_status (*build)(const shell_space *space, const double *values, void **data, knurl_error *error);
     /* First root of the shell along the ray in [tmin, tmax]. Thread-safe, never allocates. */
     bool (*intersect)(const void *data, const method_query *query);
+    /* NULL both where the data is one knurl_alloc() block of parameters, not worth counting. */
     uint64_t (*bytes)(const void *data);
     void (*destroy)(const shell_space *space, void *data);
     /* KNURL_METHOD_NATIVE only: the facets, and where a hit on them is (b1, b2, 1 - b1 - b2 in [0, 1]). */

@@ -120,8 +120,8 @@ static void fill_info(knurl_surface *surface, uint64_t replaced)
     info->texels = texels;
     info->seam_edges = shell_seam_edges(space);
     info->mesh_bytes = (uint64_t)space->mesh.vertex_count * 32 + (uint64_t)space->mesh.triangle_count * 12;
-    info->shell_bytes =
-        (uint64_t)space->mesh.triangle_count * sizeof(shell) + surface->method->bytes(surface->data);
+    info->shell_bytes = (uint64_t)space->mesh.triangle_count * sizeof(shell) +
+                        (surface->method->bytes ? surface->method->bytes(surface->data) : 0);
     info->map_bytes = map_bytes(space->map);
     /* Two triangles per texel at the 85 bytes per triangle that Embree 3.13 was measured to need. */
     info->tessellated_bytes = (uint64_t)(170.0 * texels);
@@ -137,6 +137,20 @@ static knurl_status check_heights(const shell_space *space, knurl_error *error)
         error, KNURL_ERROR_ARGUMENT,
         "displacement reaches %g (offset %g, factor %g, map from %g to %g), expected below 1e18", most,
         space->offset, space->factor, r.min, r.max);
+}
+
+static knurl_status make_data(knurl_surface *surface, const double *values, knurl_error *error)
+{
+    if (!surface->method->build) return KNURL_OK;
+    return surface->method->build(&surface->space, values, &surface->data, error);
+}
+
+static void destroy_data(knurl_surface *surface)
+{
+    if (surface->data && surface->method->destroy)
+        surface->method->destroy(&surface->space, surface->data);
+    else
+        knurl_free(surface->space.context, surface->data);
 }
 
 static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *def, const double *values,
@@ -160,7 +174,7 @@ static knurl_status make_space(knurl_surface *surface, const knurl_surface_def *
         status = make_flat_map(space->context, &space->map, error);
     if (status == KNURL_OK) status = check_heights(space, error);
     if (status == KNURL_OK) status = shell_space_build(space, error);
-    if (status == KNURL_OK) status = surface->method->build(space, values, &surface->data, error);
+    if (status == KNURL_OK) status = make_data(surface, values, error);
     return status;
 }
 
@@ -206,7 +220,7 @@ void knurl_surface_release(knurl_surface *surface)
 {
     if (!surface || atomic_fetch_sub_explicit(&surface->references, 1, memory_order_acq_rel) != 1) return;
     knurl_context *context = surface->space.context;
-    if (surface->data) surface->method->destroy(&surface->space, surface->data);
+    destroy_data(surface);
     knurl_free(context, surface->space.shells);
     base_mesh_free(context, &surface->space.mesh);
     knurl_heightmap_release(surface->space.map);

@@ -71,8 +71,11 @@ static double cross_quadratic(const ray_curve *c, const quadratic *coordinate, d
         }
     }
     if (outside <= 1e-9 * (hi - lo)) return best < lo ? lo : best > hi ? hi : best;
-    /* Rounding hid the root: bisect on the sign, which the caller's monotone stretch guarantees. */
-    bool rising = quadratic_at(&q, a) < 0.0;
+    /* Rounding hid the root: bisect on the sign. Where there is no change of sign, because the line is closer
+     * to an end than the quadratics are to the curve, the end is the root. */
+    double at_a = quadratic_at(&q, a), at_b = quadratic_at(&q, b);
+    bool rising = at_a < 0.0;
+    if (rising == (at_b < 0.0)) return fabs(at_a) <= fabs(at_b) ? a : b;
     for (int i = 0; i < 60; i++) {
         double middle = 0.5 * (a + b);
         if ((quadratic_at(&q, middle) < 0.0) == rising)
@@ -91,8 +94,8 @@ double curve_cross(const ray_curve *c, const quadratic *coordinate, double k, do
         double w = quadratic_at(&c->w, p), value = (coordinate == &c->x ? at.x : at.y) - k;
         double slope = (quadratic_slope(coordinate, p) - k * quadratic_slope(&c->w, p)) / w;
         double moved = p - value / slope;
-        if (!(moved >= min_d(a, b) && moved <= max_d(a, b))) break;
-        p = moved;
+        if (isnan(moved)) break;
+        p = min_d(max_d(moved, min_d(a, b)), max_d(a, b));
     }
     return p;
 }

@@ -29,8 +29,9 @@ static knurl_status binary_build(const shell_space *space, const double *values,
     return KNURL_OK;
 }
 
-static bool search_segment(const binary_parameters *p, segment_walk *walk)
+static bool search_segment(const void *data, segment_walk *walk)
 {
+    const binary_parameters *p = data;
     segment_point point;
     height_patch patch;
     double at = 0.0, g = segment_sample(walk, 0.0, &point, &patch);
@@ -46,30 +47,7 @@ static bool search_segment(const binary_parameters *p, segment_walk *walk)
 
 static bool binary_intersect(const void *data, const method_query *q)
 {
-    shell_segments segments;
-    if (!shell_segments_make(q->frame, q->ray, &segments))
-        return shell_subdivide(q->space, q->lod, KNURL_BOUNDS_RMIP, q->frame, q->ray, q->any, q->root,
-                               q->steps);
-    segment_walk walk = {
-        .space = q->space, .lod = q->lod, .frame = q->frame, .ray = q->ray, .segments = &segments};
-    bool found = false;
-    for (int i = 0; i < segments.count && !found; i++) {
-        walk.segment = &segments.list[i];
-        found = search_segment(data, &walk);
-    }
-    *q->steps += walk.steps;
-    if (found) *q->root = walk.root;
-    return found;
-}
-
-static uint64_t binary_bytes(const void *data)
-{
-    return data ? sizeof(binary_parameters) : 0;
-}
-
-static void binary_destroy(const shell_space *space, void *data)
-{
-    knurl_free(space->context, data);
+    return relief_intersect(q, search_segment, data);
 }
 
 const method method_binary = {
@@ -79,6 +57,4 @@ const method method_binary = {
     .parameters = PARAMETERS,
     .build = binary_build,
     .intersect = binary_intersect,
-    .bytes = binary_bytes,
-    .destroy = binary_destroy,
 };

@@ -10,6 +10,11 @@
  */
 bool relief_bisect(segment_walk *walk, double from, double to, bool above, int halvings);
 
+/* First root on one segment of the ray; `data` is the method's. */
+typedef bool relief_search(const void *data, segment_walk *walk);
+/* A method's whole query: its search on each segment in turn, front to back. */
+bool relief_intersect(const method_query *query, relief_search *search, const void *data);
+
 /* Safety radii: for each texel of level 0, how many texels the square around it may reach to each side so
  * that a ray in it that starts above the map (or below it) meets it at most once. */
 typedef struct safety_radii {

@@ -104,8 +104,9 @@ static bool touches(const segment_walk *w, const height_patch *patch, double g)
     return fabs(g) <= rounding;
 }
 
-static bool step_along(const robust_data *d, segment_walk *w)
+static bool step_along(const void *data, segment_walk *w)
 {
+    const robust_data *d = data;
     segment_point p;
     height_patch patch;
     double at = 0.0, g = segment_sample(w, 0.0, &p, &patch);
@@ -141,20 +142,7 @@ static bool step_along(const robust_data *d, segment_walk *w)
 
 static bool robust_intersect(const void *data, const method_query *q)
 {
-    shell_segments segments;
-    if (!shell_segments_make(q->frame, q->ray, &segments))
-        return shell_subdivide(q->space, q->lod, KNURL_BOUNDS_RMIP, q->frame, q->ray, q->any, q->root,
-                               q->steps);
-    segment_walk walk = {
-        .space = q->space, .lod = q->lod, .frame = q->frame, .ray = q->ray, .segments = &segments};
-    bool found = false;
-    for (int i = 0; i < segments.count && !found; i++) {
-        walk.segment = &segments.list[i];
-        found = step_along(data, &walk);
-    }
-    *q->steps += walk.steps;
-    if (found) *q->root = walk.root;
-    return found;
+    return relief_intersect(q, step_along, data);
 }
 
 const method method_robust_binary = {

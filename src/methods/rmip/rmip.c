@@ -35,16 +35,6 @@ static knurl_status rmip_build(const shell_space *space, const double *values, v
     return KNURL_OK;
 }
 
-static void rmip_destroy(const shell_space *space, void *data)
-{
-    knurl_free(space->context, data);
-}
-
-static uint64_t rmip_bytes(const void *data)
-{
-    return data ? sizeof(rmip_parameters) : 0;
-}
-
 /* A 2D bound: the rectangle spanned by the curve's points at `in` and `out`, between which x and y
  * are monotone (section 4.2). */
 typedef struct bound {
@@ -193,6 +183,4 @@ const method method_rmip = {
     .parameters = PARAMETERS,
     .build = rmip_build,
     .intersect = rmip_intersect,
-    .bytes = rmip_bytes,
-    .destroy = rmip_destroy,
 };

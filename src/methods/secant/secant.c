@@ -45,16 +45,6 @@ static knurl_status secant_build(const shell_space *space, const double *values,
     return KNURL_OK;
 }
 
-static void secant_destroy(const shell_space *space, void *data)
-{
-    knurl_free(space->context, data);
-}
-
-static uint64_t secant_bytes(const void *data)
-{
-    return data ? sizeof(secant_parameters) : 0;
-}
-
 typedef struct sample {
     double f; /* fraction of the segment */
     double g; /* height of the ray over the surface */
@@ -115,6 +105,4 @@ const method method_secant = {
     .parameters = PARAMETERS,
     .build = secant_build,
     .intersect = secant_intersect,
-    .bytes = secant_bytes,
-    .destroy = secant_destroy,
 };
