@@ -8,10 +8,10 @@
  * - Algorithm 1 compares lengths, |s - p| with D, which is right only if |N'| is 1. Eq. 7 is meant: the
  *   height of a sample at distance w above the base is h = w / (N' . Ng).
  * - The projection is along the interpolated N_i / (N_i . Ng), Eq. 7 goes along N'. They agree where the
- * three vertex normals lean equally against Ng; else the barycentrics are off by a part of the height that is
- * of third order in the angle of the normals. `projection=linear` is the paper; `projection=exact` brings
- * each sample to Eq. 7 with Newton steps from there, and uses the prism whose sides neighbours share (Eq. 3,
- * as the author's own program does), so that it converges to the surface as the step shrinks.
+ *   three vertex normals lean equally against Ng; else the barycentrics are off by a part of the height that
+ *   is of third order in the angle of the normals. `projection=linear` is the paper; `projection=exact`
+ *   brings each sample to Eq. 7 with Newton steps from there, and uses the prism whose sides neighbours share
+ *   (Eq. 3, as the author's own program does), so that it converges to the surface as the step shrinks.
  * - dt is a length of the scene in the paper. Here `step` counts texels of the base triangle. Section 5.2
  *   wants dt below the displacement; a step in texels does not know heights, so that a stretch is always cut
  *   into at least MIN_STEPS.
@@ -20,7 +20,7 @@
  * - The exit is sampled too, so that a crossing between the last step and the next prism's entry is not lost;
  *   and so is the entry if the first step is jittered.
  * - Sharp creases (section 5.4): extents are limited by `offset-limit`; where a vertex normal is on no side
- * of Ng the paper inserts base triangles, which would be another surface than that of the other methods.
+ *   of Ng the paper inserts base triangles, which would be another surface than that of the other methods.
  *   Those shells, and folded ones, go to shell_subdivide(). A triangle without area in texture space needs
  *   nothing: no texture coordinate is ever inverted.
  *
@@ -36,6 +36,8 @@
 enum { MIN_STEPS = 4, MAX_STEPS = 1 << 18, NEWTON_STEPS = 4 };
 /* A sample whose barycentrics are this far outside of the triangle is none of this shell. */
 static const double OUTSIDE = 0.05;
+/* The same before a correction. */
+static const double FAR_OUTSIDE = 0.5;
 
 static const knurl_method_parameter PARAMETERS[] = {
     {"step", "distance of samples along the ray, in texels of the base triangle (dt)", 1.0, 1e-3, 4096.0,
@@ -63,16 +65,6 @@ static knurl_status pdm_build(const shell_space *space, const double *values, vo
     return KNURL_OK;
 }
 
-static void pdm_destroy(const shell_space *space, void *data)
-{
-    knurl_free(space->context, data);
-}
-
-static uint64_t pdm_bytes(const void *data)
-{
-    return data ? sizeof(pdm_parameters) : 0;
-}
-
 /* The loop's state. */
 typedef struct pdm_scan {
     const method_query *query;
@@ -98,9 +90,9 @@ static void triangle_barycentric(vec3 s, const vec3 c[3], double *b1, double *b2
     *b2 = (d00 * d21 - d01 * d20) * inverse;
 }
 
-static bool near_triangle(double b1, double b2)
+static bool near_triangle(double b1, double b2, double outside)
 {
-    return b1 >= -OUTSIDE && b2 >= -OUTSIDE && b1 + b2 <= 1.0 + OUTSIDE;
+    return b1 >= -outside && b2 >= -outside && b1 + b2 <= 1.0 + outside;
 }
 
 /* P(b) + h N'(b) = s by Newton's method from the linear projection. */
@@ -117,8 +109,8 @@ static bool correct_to_surface(const triangle_frame *f, vec3 s, double *b1, doub
         *b1 += db1;
         *b2 += db2;
         *h += v3_dot(a, v3_cross(b, residual)) * inverse;
-        if (!near_triangle(*b1, *b2)) return false;
-        if (fabs(db1) + fabs(db2) < 1e-9) return true;
+        if (!near_triangle(*b1, *b2, FAR_OUTSIDE)) return false;
+        if (fabs(db1) + fabs(db2) < 1e-9) return near_triangle(*b1, *b2, OUTSIDE);
     }
     return false;
 }
@@ -134,7 +126,7 @@ static sample take_sample(pdm_scan *scan, double t, shell_root *root)
     double b1, b2;
     triangle_barycentric(s, scan->c, &b1, &b2);
     ++*q->steps;
-    if (!near_triangle(b1, b2)) return (sample){t, 0.0, false};
+    if (!near_triangle(b1, b2, scan->exact ? FAR_OUTSIDE : OUTSIDE)) return (sample){t, 0.0, false};
     double height = v3_dot(p->ng, s) / (p->k[0] + b1 * (p->k[1] - p->k[0]) + b2 * (p->k[2] - p->k[0]));
     if (scan->exact && !correct_to_surface(q->frame, s, &b1, &b2, &height)) return (sample){t, 0.0, false};
     shell_root_at(q->space, q->lod, q->frame, b1, b2, t, root);
@@ -248,6 +240,4 @@ const method method_pdm = {
     .parameters = PARAMETERS,
     .build = pdm_build,
     .intersect = pdm_intersect,
-    .bytes = pdm_bytes,
-    .destroy = pdm_destroy,
 };

@@ -17,6 +17,22 @@ static const double LEAST_COSINE = 0.01;
  * between two prisms, are not lost to rounding. */
 static const double EDGE_SLACK = 1e-9;
 
+static void set_extents(const triangle_frame *f, const double low[3], const double high[3], prism *p)
+{
+    for (int i = 0; i < 3; i++) {
+        p->low[i] = v3_mad(f->p[i], low[i], f->n[i]);
+        p->high[i] = v3_mad(f->p[i], high[i], f->n[i]);
+    }
+    p->size = f->size + v3_length(v3_sub(p->high[0], p->low[0]));
+}
+
+/* Whether an offset triangle lies the other way round than the base. */
+static bool turns_over(const prism *p, const vec3 corner[3])
+{
+    vec3 n = v3_cross(v3_sub(corner[1], corner[0]), v3_sub(corner[2], corner[0]));
+    return !(p->winding * v3_dot(n, p->ng) > 0.0);
+}
+
 bool prism_make(const triangle_frame *f, double offset_limit, prism *p)
 {
     p->ng = v3_normalize(v3_cross(f->pe, f->pf));
@@ -37,13 +53,18 @@ bool prism_make(const triangle_frame *f, double offset_limit, prism *p)
     /* Distances along Ng that enclose heights s0 to s1 along any of the normals. */
     double w0 = f->s0 * (f->s0 < 0.0 ? most : least), w1 = f->s1 * (f->s1 > 0.0 ? most : least);
     double limit = offset_limit * max_d(fabs(f->s0), fabs(f->s1));
-    for (int i = 0; i < 3; i++) {
-        double low = offset_limit > 0.0 ? max_d(w0 / p->k[i], -limit) : f->s0;
-        double high = offset_limit > 0.0 ? min_d(w1 / p->k[i], limit) : f->s1;
-        p->low[i] = v3_mad(f->p[i], low, f->n[i]);
-        p->high[i] = v3_mad(f->p[i], high, f->n[i]);
+    if (offset_limit > 0.0) {
+        double low[3], high[3];
+        for (int i = 0; i < 3; i++) {
+            low[i] = max_d(w0 / p->k[i], -limit);
+            high[i] = min_d(w1 / p->k[i], limit);
+        }
+        set_extents(f, low, high, p);
     }
-    p->size = f->size + v3_length(v3_sub(p->high[0], p->low[0]));
+    if (!(offset_limit > 0.0) || turns_over(p, p->low) || turns_over(p, p->high)) {
+        const double low[3] = {f->s0, f->s0, f->s0}, high[3] = {f->s1, f->s1, f->s1};
+        set_extents(f, low, high, p);
+    }
     return true;
 }
 

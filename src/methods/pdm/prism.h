@@ -25,7 +25,8 @@ typedef struct prism_stretch {
 /* The parallel offset prism of Eq. 4 to 6. Its extents are tight: w is the height range of this triangle
  * (section 5.4). An extent's length is at most offset_limit times the largest height: where a vertex
  * normal is far from Ng the division would send it away (section 5.4, figure 6). offset_limit 0: the
- * same height at every vertex, the standard prism of Eq. 3, whose sides are shared by neighbours.
+ * same height at every vertex, the standard prism of Eq. 3, whose sides are shared by neighbours. That one is
+ * also made where extents past the surface's heights would cross each other.
  * false if Ng is undefined or a vertex normal is not on its side: no such prism exists. */
 bool prism_make(const triangle_frame *frame, double offset_limit, prism *out);
 
