@@ -153,6 +153,7 @@ typedef struct knurl_method_parameter {
     const char *name, *summary;
     double preset, least, most; /* default value and closed range */
     const char *choices;        /* NULL for numbers; else names with | between, valued 0, 1, ... */
+    bool whole;                 /* a whole number */
 } knurl_method_parameter;
 
 /* Parameter number `parameter` of a method; NULL past the last. */

@@ -36,10 +36,12 @@ static knurl_status parse_value(const knurl_method_parameter *p, const char *tex
         copy[length] = '\0';
         *value = strtod(copy, &end);
     }
-    if (end == copy || *end || !(*value >= p->least && *value <= p->most))
+    if (end == copy || *end || !(*value >= p->least && *value <= p->most) ||
+        (p->whole && *value != floor(*value)))
         return knurl_fail(error, KNURL_ERROR_ARGUMENT,
-                          "method parameter %s: found '%.*s', expected a number from %g to %g", p->name,
-                          length < 100 ? (int)length : 100, text, p->least, p->most);
+                          "method parameter %s: found '%.*s', expected a %s from %g to %g", p->name,
+                          length < 100 ? (int)length : 100, text, p->whole ? "whole number" : "number",
+                          p->least, p->most);
     return KNURL_OK;
 }
 

@@ -25,9 +25,9 @@
 #include "shell/segment_walk.h"
 
 static const knurl_method_parameter PARAMETERS[] = {
-    {"skips", "pairs of a forward and a backward skip (section 3.3)", 2.0, 0.0, 2.0, NULL},
-    {"samples", "per unit of length in (u, v, map value) (section 5)", 75.0, 1.0, 65536.0, NULL},
-    {"bisections", "false position steps after the samples (section 3.1)", 2.0, 0.0, 64.0, NULL},
+    {"skips", "pairs of a forward and a backward skip (section 3.3)", 2.0, 0.0, 2.0, NULL, true},
+    {"samples", "per unit of length in (u, v, map value) (section 5)", 75.0, 1.0, 65536.0, NULL, true},
+    {"bisections", "false position steps after the samples (section 3.1)", 2.0, 0.0, 64.0, NULL, true},
     {0}};
 
 enum { MOST_SAMPLES = 65536 };

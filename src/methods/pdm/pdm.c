@@ -41,12 +41,13 @@ static const double FAR_OUTSIDE = 0.5;
 
 static const knurl_method_parameter PARAMETERS[] = {
     {"step", "distance of samples along the ray, in texels of the base triangle (dt)", 1.0, 1e-3, 4096.0,
-     NULL},
+     NULL, false},
     {"jitter", "shift the first step by a part of it, for thin features over many rays (section 5.3)", 0.0,
-     0.0, 1.0, "off|on"},
+     0.0, 1.0, "off|on", false},
     {"offset-limit", "longest extent of a prism at a crease, in largest heights (section 5.4)", 2.0, 1.0, 1e6,
-     NULL},
-    {"projection", "linear: Algorithm 1; exact: samples corrected to Eq. 7", 0.0, 0.0, 1.0, "linear|exact"},
+     NULL, false},
+    {"projection", "linear: Algorithm 1; exact: samples corrected to Eq. 7", 0.0, 0.0, 1.0, "linear|exact",
+     false},
     {0}};
 
 typedef struct pdm_parameters {

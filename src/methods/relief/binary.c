@@ -11,8 +11,8 @@
 #include "methods/relief/relief.h"
 
 static const knurl_method_parameter PARAMETERS[] = {
-    {"linear", "uniform steps per base triangle that the ray crosses", 32.0, 1.0, 4096.0, NULL},
-    {"binary", "halvings of the step that passed through the surface", 6.0, 0.0, 52.0, NULL},
+    {"linear", "uniform steps per base triangle that the ray crosses", 32.0, 1.0, 4096.0, NULL, true},
+    {"binary", "halvings of the step that passed through the surface", 6.0, 0.0, 52.0, NULL, true},
     {0}};
 
 typedef struct binary_parameters {

@@ -17,10 +17,10 @@
 
 static const knurl_method_parameter PARAMETERS[] = {
     {"allowance", "depth of surface that may be passed unseen, as a part of the map's range (Figure 12)",
-     0.004, 0.0, 1.0, NULL},
+     0.004, 0.0, 1.0, NULL, false},
     {"zero", "what is done where the safety radius is 0: walk the cell, or step one texel (section 3.4)", 0.0,
-     0.0, 1.0, "exact|clamp"},
-    {"binary", "halvings of the step that passed through the surface", 20.0, 0.0, 52.0, NULL},
+     0.0, 1.0, "exact|clamp", false},
+    {"binary", "halvings of the step that passed through the surface", 20.0, 0.0, 52.0, NULL, true},
     {0}};
 
 typedef struct robust_data {

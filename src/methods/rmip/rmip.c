@@ -11,11 +11,12 @@
 #include "shell/pieces.h"
 
 static const knurl_method_parameter PARAMETERS[] = {
-    {"marching-scale", "texels; bounds at most this long are marched (section 4.4)", 6.0, 1.0, 4096.0, NULL},
+    {"marching-scale", "texels; bounds at most this long are marched (section 4.4)", 6.0, 1.0, 4096.0, NULL,
+     false},
     {"inversion", "tighten bounds by inverting box entry and exit (Algorithm 1, line 15)", 1.0, 0.0, 1.0,
-     "off|on"},
+     "off|on", false},
     {"bounds", "range structure; minmax covers a rectangle by up to 2 x 2 nodes of the mipmap", 1.0, 0.0, 1.0,
-     "minmax|rmip"},
+     "minmax|rmip", false},
     {0}};
 
 typedef struct rmip_parameters {

@@ -23,8 +23,8 @@
 #include "shell/segment.h"
 
 static const knurl_method_parameter PARAMETERS[] = {
-    {"samples", "samples in each pass, entry and exit included", 15.0, 2.0, 4096.0, NULL},
-    {"passes", "equal parts that the ray is split into", 1.0, 1.0, 256.0, NULL},
+    {"samples", "samples in each pass, entry and exit included", 15.0, 2.0, 4096.0, NULL, true},
+    {"passes", "equal parts that the ray is split into", 1.0, 1.0, 256.0, NULL, true},
     {0}};
 
 typedef struct secant_parameters {
@@ -34,10 +34,6 @@ typedef struct secant_parameters {
 static knurl_status secant_build(const shell_space *space, const double *values, void **data,
                                  knurl_error *error)
 {
-    for (int i = 0; i < 2; i++)
-        if (values[i] != floor(values[i]))
-            return knurl_fail(error, KNURL_ERROR_ARGUMENT, "method secant: %s is %g, expected a whole number",
-                              PARAMETERS[i].name, values[i]);
     secant_parameters *p = knurl_alloc_zero(space->context, sizeof *p);
     *data = p;
     if (!p) return knurl_fail_memory(error, sizeof *p, "method secant");

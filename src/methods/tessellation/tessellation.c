@@ -11,9 +11,11 @@
 #include <unistd.h>
 
 static const knurl_method_parameter PARAMETERS[] = {
-    {"primitive", "what Embree gets; grids take the least memory", 0.0, 0.0, 2.0, "triangles|quads|grids"},
-    {"rate", "vertices per texel along edges", 1.0, 0.001, 64.0, NULL},
-    {"budget", "most triangles in millions, reached by lowering the rate; 0: none", 0.0, 0.0, 1e6, NULL},
+    {"primitive", "what Embree gets; grids take the least memory", 0.0, 0.0, 2.0, "triangles|quads|grids",
+     false},
+    {"rate", "vertices per texel along edges", 1.0, 0.001, 64.0, NULL, false},
+    {"budget", "most triangles in millions, reached by lowering the rate; 0: none", 0.0, 0.0, 1e6, NULL,
+     false},
     {0}};
 
 /* Bytes that Embree 3.13 was measured to hold at most while it builds its hierarchy, per primitive (for

@@ -27,9 +27,9 @@
 
 static const knurl_method_parameter PARAMETERS[] = {
     {"leaf-texels", "texels per side of a leaf; larger ones than the paper's 1 are marched", 0.0, 0.0, 5.0,
-     "1|2|4|8|16|32"},
+     "1|2|4|8|16|32", false},
     {"boxes", "axes that nodes' boxes are aligned with; the paper's are the world's", 0.0, 0.0, 1.0,
-     "world|normal"},
+     "world|normal", false},
     {0}};
 
 typedef struct tfdm_data {
