@@ -1,5 +1,6 @@
 /* Straight segments of a ray in texture space; see segment.h. */
 #include "shell/segment.h"
+#include "shell/pieces.h"
 
 #include <float.h>
 
@@ -25,20 +26,6 @@ static segment_point point_at(const ray_curve *c, double p, double k)
                            .y = at.y,
                            .h = at.s * frame_normal_scale(c->frame, at.b1, at.b2),
                            .weight = 1.0 - k * at.s};
-}
-
-/* Narrows a stretch to the ray's [tmin, tmax], a little wider than that; false if nothing is left. */
-static bool clip_to_ray(const ray_curve *c, const knurl_ray *ray, const curve_interval *stretch, double *in,
-                        double *out)
-{
-    double slack =
-        1e-12 * (fabs(stretch->t_in) + fabs(stretch->t_out)) + 1e-9 * (stretch->t_out - stretch->t_in);
-    *in = stretch->in;
-    *out = stretch->out;
-    if (stretch->t_out < ray->tmin - slack || stretch->t_in > ray->tmax + slack) return false;
-    if (ray->tmin > stretch->t_in) *in = curve_invert(c, stretch->in, stretch->out, ray->tmin - slack);
-    if (ray->tmax < stretch->t_out) *out = curve_invert(c, stretch->in, stretch->out, ray->tmax + slack);
-    return true;
 }
 
 /* Weights of one sign, made positive: all that (1) reads are their ratios. */
@@ -79,10 +66,10 @@ bool shell_segments_make(const triangle_frame *f, const knurl_ray *ray, shell_se
     out->texel_rounding = curve.texel_rounding;
     out->height_rounding = height_rounding(&curve);
     for (int i = 0; i < curve.interval_count; i++) {
-        double first, last;
-        if (!clip_to_ray(&curve, ray, &curve.intervals[i], &first, &last)) continue;
+        curve_interval stretch = curve.intervals[i];
+        if (!curve_clip_to_ray(&curve, ray, &stretch)) continue;
         shell_segment *s = &out->list[out->count];
-        *s = (shell_segment){point_at(&curve, first, k), point_at(&curve, last, k)};
+        *s = (shell_segment){point_at(&curve, stretch.in, k), point_at(&curve, stretch.out, k)};
         if (!settle_weights(s)) {
             out->count = 0;
             return false;

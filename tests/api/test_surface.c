@@ -252,6 +252,42 @@ static void directions_make_a_frustum(void **state)
     knurl_context_release(context);
 }
 
+/* Where a method looks must not depend on tmax: shells are tried in any order, each with the best hit so far
+ * as tmax. A hit within tmax is the same hit, and occlusion is the existence of one. */
+static void hits_do_not_depend_on_tmax(void **state)
+{
+    (void)state;
+    knurl_context *context = make_context();
+    static const float bent[9] = {0.1f, 1, 0, 0.3f, 1, 0, 0, 1, -0.2f};
+    for (int32_t m = 0; m < knurl_method_count(); m++) {
+        if (knurl_method_flags(m) & KNURL_METHOD_NATIVE) continue;
+        knurl_surface_def def = triangle_def(bent, random_map(context, 16), 0.1);
+        def.method = knurl_method_name(m);
+        knurl_surface *surface = create(context, &def);
+        random_state random = {11};
+        int hits = 0;
+        for (int i = 0; i < 500; i++) {
+            double a = random_unit(&random), b = random_unit(&random) * (1.0 - a);
+            double origin[3] = {random_range(&random, -0.5, 1.5), 0.4, random_range(&random, -0.5, 1.5)};
+            double direction[3] = {a - origin[0], -0.4, b - origin[2]};
+            knurl_ray ray = knurl_ray_make(origin, direction);
+            knurl_hit hit = {.triangle = KNURL_NO_HIT}, again = hit;
+            if (!knurl_surface_intersect(surface, 0, &ray, &hit)) continue;
+            hits++;
+            ray.tmax = hit.t * (1.0 + 1e-6);
+            if (!knurl_surface_intersect(surface, 0, &ray, &again) || fabs(again.t - hit.t) > 1e-12 ||
+                !knurl_surface_occluded(surface, 0, &ray))
+                fail_msg("%s: ray %d: t %.17g, then %.17g", def.method, i, hit.t, again.t);
+            ray.tmax = hit.t * (1.0 - 1e-6);
+            if (knurl_surface_intersect(surface, 0, &ray, &again) && again.t > ray.tmax)
+                fail_msg("%s: ray %d: t %.17g over tmax", def.method, i, again.t);
+        }
+        assert_true(hits > 200);
+        knurl_surface_release(surface);
+    }
+    knurl_context_release(context);
+}
+
 static void methods_refuse_bad_parameters(void **state)
 {
     (void)state;
@@ -292,7 +328,7 @@ int main(void)
         cmocka_unit_test(opposing_normals_end),          cmocka_unit_test(any_direction_length),
         cmocka_unit_test(huge_heights_are_refused),      cmocka_unit_test(fine_texels_end),
         cmocka_unit_test(seams_know_wrapping),           cmocka_unit_test(directions_make_a_frustum),
-        cmocka_unit_test(methods_refuse_bad_parameters),
+        cmocka_unit_test(methods_refuse_bad_parameters), cmocka_unit_test(hits_do_not_depend_on_tmax),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

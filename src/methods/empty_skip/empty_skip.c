@@ -14,7 +14,7 @@
  * filtered texture lookup would not be; values are 8-bit as in an RGBA texture, rounded outwards;
  * - a pair of forward and backward skips is one of `skips`;
  * - `samples` counts per unit of length in prism coordinates, (u, v) and the map's value (the caption of
- *   Figure 10), at most 65,536 per base triangle. Samples lie at the same places whatever was skipped, so
+ *   Figure 10), at most 65,536 per stretch. Samples lie at the same places whatever was skipped, so
  *   that skipping changes the work and never the hit;
  * - the hit is the last point of the search, not moved onto the surface;
  * - level of detail: samples read any, blended ones included; zones of level 0 serve all, with their boxes
@@ -191,9 +191,11 @@ static bool sample_between(search *s, double first, double last, bool above)
         double at = k / count, g = gap_at(s, at);
         if ((g > 0.0) != above) {
             if (isnan(g_from)) g_from = gap_at(s, from);
-            return narrow(s, from, g_from, at, g);
+            if (narrow(s, from, g_from, at, g)) return true;
+            above = !above; /* behind the ray's start: what comes next may not be */
+            last = 1.0;
         }
-        if (at >= last) return false;
+        if (at >= last || segment_at(s->walk.segment, at).t > s->walk.ray->tmax) return false;
         from = at;
         g_from = g;
     }
@@ -221,7 +223,9 @@ static bool search_segment(search *s)
 static bool empty_skip_intersect(const void *data, const method_query *q)
 {
     shell_segments segments;
-    if (!shell_segments_make(q->frame, q->ray, &segments))
+    knurl_ray line = *q->ray;
+    line.tmax = INFINITY; /* places of samples do not depend on what was hit before */
+    if (!shell_segments_make(q->frame, &line, &segments))
         return shell_subdivide(q->space, q->lod, KNURL_BOUNDS_RMIP, q->frame, q->ray, q->any, q->root,
                                q->steps);
     search s = {.data = data};
@@ -231,6 +235,7 @@ static bool empty_skip_intersect(const void *data, const method_query *q)
     bool found = false;
     for (int i = 0; i < segments.count && !found; i++) {
         s.walk.segment = &segments.list[i];
+        if (s.walk.segment->in.t > q->ray->tmax) break;
         found = search_segment(&s);
     }
     *q->steps += s.walk.steps;

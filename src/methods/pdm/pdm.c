@@ -9,7 +9,8 @@
  *   height of a sample at distance w above the base is h = w / (N' . Ng).
  * - The projection is along the interpolated N_i / (N_i . Ng), Eq. 7 goes along N'. They agree where the
  *   three vertex normals lean equally against Ng; else the barycentrics are off by a part of the height that
- *   is of third order in the angle of the normals. `projection=linear` is the paper; `projection=exact`
+ *   is of third order in the angle of unit normals (first order for directions of other lengths).
+ *   `projection=linear` is the paper; `projection=exact`
  *   brings each sample to Eq. 7 with Newton steps from there, and uses the prism whose sides neighbours share
  *   (Eq. 3, as the author's own program does), so that it converges to the surface as the step shrinks.
  * - dt is a length of the scene in the paper. Here `step` counts texels of the base triangle. Section 5.2

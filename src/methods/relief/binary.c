@@ -11,7 +11,7 @@
 #include "methods/relief/relief.h"
 
 static const knurl_method_parameter PARAMETERS[] = {
-    {"linear", "uniform steps per base triangle that the ray crosses", 32.0, 1.0, 4096.0, NULL, true},
+    {"linear", "uniform steps per stretch of the ray inside a prism", 32.0, 1.0, 4096.0, NULL, true},
     {"binary", "halvings of the step that passed through the surface", 6.0, 0.0, 52.0, NULL, true},
     {0}};
 
@@ -39,7 +39,11 @@ static bool search_segment(const void *data, segment_walk *walk)
     for (int i = 1; i <= p->linear; i++) {
         double to = (double)i / (double)p->linear;
         g = segment_sample(walk, to, &point, &patch);
-        if ((g > 0.0) != above) return relief_bisect(walk, at, to, above, p->binary);
+        if ((g > 0.0) != above) {
+            if (relief_bisect(walk, at, to, above, p->binary)) return true;
+            above = !above; /* behind the ray's start: what comes next may not be */
+        }
+        if (point.t > walk->ray->tmax) return false;
         at = to;
     }
     return false;

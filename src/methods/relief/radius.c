@@ -24,7 +24,7 @@
  * All of them are conservative: a radius may be too small, never too large. Time grows with the number of
  * texels and not with what is in them: one or two microseconds of one core per texel at most, because no
  * radius is over 32; maps of more than a million texels leave out the smallest squares (least_step()). Memory
- * is two bytes per texel, and as much again, for a moment, while building. */
+ * is two bytes per texel, and three more, for a moment, while building. */
 #include "methods/relief/relief.h"
 
 #include <float.h>
@@ -304,8 +304,8 @@ static int inherited(const square_grid *coarser, int32_t a, int32_t b)
 {
     int bits = 0;
     if (!coarser->bits) return bits;
-    for (int32_t y = (b + 1) / 2 - 1 + (b & 1); 2 * y <= b; y++)
-        for (int32_t x = (a + 1) / 2 - 1 + (a & 1); 2 * x <= a; x++)
+    for (int32_t y = (b + 1) / 2 - 1; 2 * y <= b; y++)
+        for (int32_t x = (a + 1) / 2 - 1; 2 * x <= a; x++)
             if (x >= -1 && y >= -1 && x + 1 < coarser->columns && y + 1 < coarser->rows)
                 bits |= grid_at(coarser, x, y);
     return bits;

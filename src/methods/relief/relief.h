@@ -12,7 +12,9 @@ bool relief_bisect(segment_walk *walk, double from, double to, bool above, int h
 
 /* First root on one segment of the ray; `data` is the method's. */
 typedef bool relief_search(const void *data, segment_walk *walk);
-/* A method's whole query: its search on each segment in turn, front to back. */
+/* A method's whole query: its search on each segment in turn, front to back. Segments do not end at the ray's
+ * tmax: neither places of samples nor the chord on a curved base may depend on what was hit before, or the
+ * order in which shells are tried would show. A search ends where t is past tmax. */
 bool relief_intersect(const method_query *query, relief_search *search, const void *data);
 
 /* Safety radii: for each texel of level 0, how many texels the square around it may reach to each side so

@@ -114,6 +114,7 @@ static bool step_along(const void *data, segment_walk *w)
     uint64_t limit = most_steps(w->segment);
     for (uint64_t n = 0; n < limit && at < 1.0; n++) {
         bool above = g > 0.0;
+        if (p.t > w->ray->tmax) return false;
         int32_t r = radius_at(d, w, &p, above);
         if (r == 0 && !d->clamp) {
             double to = segment_next_line(w, at);

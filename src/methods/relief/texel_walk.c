@@ -17,7 +17,9 @@ static const knurl_method_parameter PARAMETERS[] = {{0}};
 static bool walk_segment(const void *data, segment_walk *walk)
 {
     (void)data;
-    return segment_walk_cells(walk, 0.0, 1.0);
+    const shell_segment *s = walk->segment;
+    double end = (walk->ray->tmax - s->in.t) / (s->out.t - s->in.t) + 1e-9; /* t is affine */
+    return segment_walk_cells(walk, 0.0, end < 1.0 ? end : 1.0);
 }
 
 static bool texel_walk_intersect(const void *data, const method_query *q)

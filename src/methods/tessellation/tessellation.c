@@ -104,7 +104,12 @@ static knurl_status tessellation_build(const shell_space *space, const double *v
     status = check_memory(&t->plan, &sizes, kind, error);
     if (status == KNURL_OK && sizes.primitives > 0) status = facets_fill(t, kind, &sizes, error);
     if (status == KNURL_OK && sizes.grids > 0) status = grids_fill(t, &sizes, error);
-    if (values[2] > 0.0 && t->plan.rate < values[1])
+    if (status != KNURL_OK || !(values[2] > 0.0)) return status;
+    if ((double)plan_triangles(&t->plan) > 1e6 * values[2])
+        knurl_log(space->context, KNURL_LOG_WARNING,
+                  "method tessellation: the base mesh alone has more triangles than the budget of %g million",
+                  values[2]);
+    else if (t->plan.rate < values[1])
         knurl_log(space->context, KNURL_LOG_INFO, "method tessellation: rate %g keeps to the budget",
                   t->plan.rate);
     return status;
