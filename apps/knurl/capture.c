@@ -83,7 +83,8 @@ static int trace_views(command_session *session, const capture_options *options,
     for (int k = 0; k < result->count && code == CODE_DONE; k++) {
         code = capture_view_trace(&job, &result->views[k], &result->maps[k]);
         if (code == CODE_DONE && result->maps[k].hits == 0)
-            session_note(session, "knurl: view %s meets nothing and is left out", result->views[k].name);
+            session_note(session, "knurl: %s%s meets nothing and is left out",
+                         result->views[k].name[0] ? "view " : "the view", result->views[k].name);
     }
     capture_textures_release(textures);
     return code;
@@ -92,7 +93,9 @@ static int trace_views(command_session *session, const capture_options *options,
 static void summarise(command_session *session, const capture_options *options, const capture_result *result)
 {
     double texels = 0, hits = 0;
+    int written = 0;
     for (int k = 0; k < result->count; k++) {
+        written += result->maps[k].hits > 0;
         texels += (double)result->views[k].width * result->views[k].height;
         hits += (double)result->maps[k].hits;
     }
@@ -102,8 +105,8 @@ static void summarise(command_session *session, const capture_options *options, 
         session,
         "knurl: %s/capture.gltf: %d %s, %d texels across, %.1f %% of them hit, depth in %s, %llu base "
         "triangles",
-        options->folder, result->count, result->count == 1 ? "view" : "views", (int)options->size,
-        100 * hits / texels, step, (unsigned long long)result->triangles);
+        options->folder, written, written == 1 ? "view" : "views", (int)options->size, 100 * hits / texels,
+        step, (unsigned long long)result->triangles);
 }
 
 static int capture_loaded(command_session *session, const capture_options *options,

@@ -83,7 +83,11 @@ static int render_loaded(command_session *session, render_options *options, cons
     knurl_status status = knurl_render(loaded->description, loaded->scene, &options->def, &result, &error);
     progress_clear(&session->progress);
     int code = CODE_DONE;
-    if (status == KNURL_OK || (status == KNURL_INTERRUPTED && result.beauty)) {
+    if (status == KNURL_INTERRUPTED && result.beauty && result.stats.samples_done == 0) {
+        code = session_fail_with(session, CODE_INTERRUPTED,
+                                 "interrupted before one sample per pixel was finished; %s was not written",
+                                 options->out);
+    } else if (status == KNURL_OK || (status == KNURL_INTERRUPTED && result.beauty)) {
         code = render_save(session, options, &result);
         if (code == CODE_DONE && options->stats)
             code = save_stats(session, options, loaded, &result, status == KNURL_INTERRUPTED);
@@ -107,7 +111,7 @@ int render_command(int argc, char **argv)
     signals_install();
     command_session session;
     int code = session_open(&session, "render", &options.general);
-    if (code == CODE_DONE) code = output_check(&session, options.out);
+    if (code == CODE_DONE) code = render_check_outputs(&session, &options);
     if (code == CODE_DONE && options.stats) code = output_check(&session, options.stats);
     loaded_scene loaded = {0};
     if (code == CODE_DONE)

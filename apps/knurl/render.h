@@ -21,6 +21,8 @@ void render_options_parse(int argc, char **argv, render_options *options);
 bool render_format_known(const char *path);
 extern const char render_formats[]; /* for messages */
 
+/* Whether all that will be written can be, before the work is done. */
+int render_check_outputs(command_session *session, const render_options *options);
 /* Writes the picture and the AOVs. Reports failures, returns an exit code. */
 int render_save(command_session *session, const render_options *options, const knurl_render_result *result);
 

@@ -62,34 +62,48 @@ static knurl_status save_layers(knurl_context *context, const char *path, const 
     return knurl_image_save_layers(context, layers, count, path, error);
 }
 
-/* "out/a.png" and "depth": "out/a.depth.exr". */
-static knurl_status save_aov(knurl_context *context, const char *out, int32_t index, const knurl_image *image,
-                             knurl_error *error)
+/* "out/a.png" and "depth": "out/a.depth.exr". False if that is too long. */
+static bool aov_path(const char *out, int32_t index, char path[4096])
 {
-    char path[4096];
     const char *dot = strrchr(out, '.');
-    int length = snprintf(path, sizeof path, "%.*s.%s.exr", (int)(dot - out), out, knurl_aov_name(index));
-    if (length < 0 || (size_t)length >= sizeof path) {
-        error->status = KNURL_ERROR_OUTPUT;
-        snprintf(error->message, sizeof error->message, "the output name is too long");
-        return error->status;
+    int length = snprintf(path, 4096, "%.*s.%s.exr", (int)(dot - out), out, knurl_aov_name(index));
+    return length >= 0 && length < 4096;
+}
+
+static bool has_layers(const char *path)
+{
+    char extension[16];
+    path_extension(path, extension);
+    return strcmp(extension, ".exr") == 0;
+}
+
+int render_check_outputs(command_session *session, const render_options *options)
+{
+    int code = output_check(session, options->out);
+    char path[4096];
+    for (int32_t i = 0; i < KNURL_AOV_COUNT && code == CODE_DONE && !has_layers(options->out); i++) {
+        if (!(options->def.aovs & 1u << i)) continue;
+        if (!aov_path(options->out, i, path))
+            return session_fail_with(session, CODE_FILE, "%s: the name is too long to add an AOV's to it",
+                                     options->out);
+        code = output_check(session, path);
     }
-    return knurl_image_save(context, image, path, error);
+    return code;
 }
 
 int render_save(command_session *session, const render_options *options, const knurl_render_result *result)
 {
     knurl_error error = {0};
     knurl_status status;
-    char extension[16];
+    char extension[16], path[4096];
     path_extension(options->out, extension);
-    if (strcmp(extension, ".exr") == 0) {
+    if (has_layers(options->out)) {
         status = save_layers(session->context, options->out, result, &error);
     } else {
         status = save_beauty(session->context, options, extension, result->beauty, &error);
         for (int32_t i = 0; i < KNURL_AOV_COUNT && status == KNURL_OK; i++)
-            if (result->aovs[i])
-                status = save_aov(session->context, options->out, i, result->aovs[i], &error);
+            if (result->aovs[i] && aov_path(options->out, i, path))
+                status = knurl_image_save(session->context, result->aovs[i], path, &error);
     }
     return status == KNURL_OK ? CODE_DONE : session_fail(session, &error);
 }

@@ -273,7 +273,10 @@ bool accel_bvh_start_ray(const accel_bvh *bvh, const accel_segment *segment, str
     double shrink = ldexp(1.0, -exponent);
     vec3 d = v3_scale(segment->direction, shrink), o = v3_scale(segment->origin, bvh->scale);
     *rate = bvh->scale / shrink;
-    if (!v3_finite(d) || !isfinite(*rate) || !(*rate > 0.0)) return false;
+    /* Embree asks for coordinates under 1.8e18. A ray that starts so far away that its distance to the object
+     * is only known to more than that many sizes of it hits nothing. */
+    if (!v3_finite(d) || !isfinite(*rate) || !(*rate > 0.0) || !(v3_max_component(v3_abs(o)) < 1e17))
+        return false;
     memset(ray, 0, sizeof *ray);
     ray->org_x = (float)o.x, ray->org_y = (float)o.y, ray->org_z = (float)o.z;
     ray->dir_x = (float)d.x, ray->dir_y = (float)d.y, ray->dir_z = (float)d.z;

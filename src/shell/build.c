@@ -7,6 +7,8 @@
 /* A shell counts as folded already where its volume element falls to this fraction of its largest
  * value: inversion is badly conditioned there. */
 static const double FOLD_MARGIN = 0.01;
+/* Frusta narrow towards their apex on purpose, and stay invertible up to it: captured reliefs come close. */
+static const double FOLD_MARGIN_DIRECTIONS = 1e-5;
 /* Interpolated normals shorter than this are as good as opposing. */
 static const double LEAST_NORMAL = 1e-3;
 
@@ -62,7 +64,7 @@ static quadratic volume_quadratic(const triangle_frame *f, vec3 a)
 
 /* det[P_a + s N_a, P_b + s N_b, N] is linear in the barycentrics through N: its sign over the shell
  * is that of the Bernstein coefficients of the three vertices' quadratics in s. */
-static bool is_folded(const triangle_frame *f)
+static bool is_folded(const triangle_frame *f, double margin)
 {
     double least = INFINITY, most = -INFINITY;
     for (int i = 0; i < 3; i++) {
@@ -74,7 +76,7 @@ static bool is_folded(const triangle_frame *f)
             most = max_d(most, b[k]);
         }
     }
-    return !(least > FOLD_MARGIN * most) && !(most < FOLD_MARGIN * least);
+    return !(least > margin * most) && !(most < margin * least);
 }
 
 /* No area at any height: the offset triangles at three heights are all degenerate, so the quadratic
@@ -174,7 +176,8 @@ static void build_shell(const shell_space *space, const height_lod *lod, uint32_
     stored->area = round_up((1.0 + 1e-9) * max_d(offset_area(&f, f.s0), offset_area(&f, f.s1)));
     if (is_empty(&f))
         stored->flags |= SHELL_EMPTY;
-    else if (is_folded(&f) || (!space->unnormalised && least < LEAST_NORMAL))
+    else if (is_folded(&f, space->directions ? FOLD_MARGIN_DIRECTIONS : FOLD_MARGIN) ||
+             (!space->unnormalised && least < LEAST_NORMAL))
         stored->flags |= SHELL_FOLDED;
     if (is_flat_uv(&f)) stored->flags |= SHELL_FLAT_UV;
     if (all_equal_normals(&f)) stored->flags |= SHELL_CONSTANT_NORMAL;

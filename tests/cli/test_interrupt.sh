@@ -19,6 +19,7 @@ os.execv(sys.argv[1], sys.argv[1:])' "$@" >stdout.txt 2>log.txt &
         kill -0 $process 2>/dev/null || { cat log.txt >&2; fail "ended before the signal"; }
         sleep 0.1
     done
+    sleep 1 # so that something is finished
     kill -"$signal" $process
     wait $process || found=$?
     [ $found -eq 130 ] || { cat log.txt >&2; fail "status $found after SIG$signal, expected 130"; }
