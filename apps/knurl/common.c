@@ -115,6 +115,18 @@ knurl_status displacement_override(knurl_description *description, const displac
     return knurl_description_override(description, &override, error);
 }
 
+/* A forgotten --disp should not go unnoticed. */
+static void warn_without_map(command_session *session, const knurl_description *description,
+                             const displacement_options *options)
+{
+    if (isnan(options->factor) && isnan(options->tile_u) && options->wrap < 0) return;
+    for (uint32_t i = 0; i < description->material_count; i++)
+        if (description->materials[i].displacement.image >= 0) return;
+    session_note(session,
+                 "knurl: warning: no material has a displacement map, so that --disp-factor, --tile and "
+                 "--wrap do nothing; --disp names one");
+}
+
 static knurl_status build_scene(command_session *session, const method_options *method, loaded_scene *loaded,
                                 knurl_error *error)
 {
@@ -134,6 +146,7 @@ int scene_load(command_session *session, const char *path, const displacement_op
     double start = seconds_now();
     knurl_status status = knurl_description_load(session->context, path, &loaded->description, &error);
     if (status == KNURL_OK) status = displacement_override(loaded->description, displacement, &error);
+    if (status == KNURL_OK) warn_without_map(session, loaded->description, displacement);
     double middle = seconds_now();
     loaded->load_seconds = middle - start;
     if (status == KNURL_OK) status = build_scene(session, method, loaded, &error);

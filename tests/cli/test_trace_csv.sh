@@ -27,6 +27,14 @@ expect 0 "$knurl" trace plane.obj --disp-offset 0.25 --rays order.csv --out out.
 [ "$(sed -n 3p out.csv)" = "0,,,,,,,,,,,,,,," ] || fail "tmax is ignored"
 [ "$(sed -n 4p out.csv)" = "0,,,,,,,,,,,,,,," ] || fail "tmin is ignored"
 
+# Rays from beyond all precision miss, and do not end the program.
+printf 'ox,oy,oz,dx,dy,dz\n0,1e34,0,0,-1,0\n0,1e308,0,0,-1,0\n1e300,1,0,-1e300,0,0\n' >far.csv
+expect 0 "$knurl" trace plane.obj --disp-offset 0.25 --rays far.csv --out far-hits.csv
+[ "$(wc -l <far-hits.csv)" -eq 4 ] || fail "expected a header and three lines"
+expect 0 "$knurl" trace plane.obj --rays far.csv --out far-hits.csv --any-hit
+expect 0 "$knurl" trace plane.obj --tile 2x2 --rays rays.csv --out out.csv
+expect_text stderr.txt "warning: no material has a displacement map"
+
 # Standard input and output, any hit, no rays at all.
 expect 0 "$knurl" trace plane.obj --disp-offset 0.25 --rays - --out - <rays.csv
 cmp -s stdout.txt hits.csv || fail "standard output differs from the file"
