@@ -25,7 +25,7 @@ typedef struct knurl_mesh_view {
     uint32_t vertex_count;
     const uint32_t *triangles; /* 3 per triangle, each under vertex_count */
     uint32_t triangle_count;
-    const float *directions; /* NULL, or 3 per vertex: N of any finite, non-zero length in place of
+    const float *directions; /* NULL, or 3 per vertex: N of any non-zero length below 1e18 in place of
                                 the unit normals; the surface is then S = P + h N whatever
                                 knurl_displacement.unnormalised says. With N pointing to one point,
                                 shells are frusta (reverse perspective, Baboud and Decoret 2006) */
@@ -47,7 +47,8 @@ typedef struct knurl_displacement {
 
 KNURL_API knurl_displacement knurl_displacement_default(void);
 
-/* Ray. Points are origin + t * direction; direction may have any finite, non-zero length. */
+/* Ray. Points are origin + t * direction; direction may have any finite, non-zero length. An origin may be
+ * anywhere; the hit is as exact as t, which is rounded relative to the distance. */
 typedef struct knurl_ray {
     double origin[3];
     double direction[3];

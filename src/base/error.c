@@ -63,8 +63,11 @@ knurl_status knurl_fail_prefix(knurl_error *error, knurl_status status, const ch
 
 knurl_status knurl_fail_memory(knurl_error *error, size_t bytes, const char *what)
 {
-    return knurl_fail(error, KNURL_ERROR_MEMORY, "out of memory: %.1f MiB for %s", (double)bytes / 1048576.0,
-                      what);
+    if (bytes < 1048576)
+        return knurl_fail(error, KNURL_ERROR_MEMORY,
+                          "out of memory or over the memory limit: %zu bytes for %s", bytes, what);
+    return knurl_fail(error, KNURL_ERROR_MEMORY, "out of memory or over the memory limit: %.1f MiB for %s",
+                      (double)bytes / 1048576.0, what);
 }
 
 void knurl_log(const knurl_context *context, knurl_log_level level, const char *format, ...)

@@ -1,6 +1,7 @@
 /* The public surface: mesh, map and method together. */
 #include "methods/method.h"
 #include "shell/curve.h"
+#include "shell/near.h"
 #include "shell/evaluate.h"
 
 #include <string.h>
@@ -9,7 +10,9 @@ struct knurl_surface {
     shell_space space;
     atomic_size_t references;
     const method *method;
-    void *data; /* the method's own */
+    void *data;  /* the method's own */
+    vec3 centre; /* a ball that holds all shells */
+    double radius;
     knurl_surface_info info;
 };
 
@@ -113,6 +116,9 @@ static void fill_info(knurl_surface *surface, uint64_t replaced)
         h0 = min_d(h0, (double)stored->height_min);
         h1 = max_d(h1, (double)stored->height_max);
     }
+    bool some = lower.x <= upper.x;
+    surface->centre = some ? v3_scale(v3_add(lower, upper), 0.5) : v3(0.0, 0.0, 0.0);
+    surface->radius = some ? 0.5 * v3_length(v3_sub(upper, lower)) * (1.0 + 1e-12) : 0.0;
     v3_store(info->lower, lower);
     v3_store(info->upper, upper);
     info->height_min = h0 <= h1 ? h0 : 0.0;
@@ -245,45 +251,29 @@ bool knurl_surface_shell_bounds(const knurl_surface *surface, uint32_t shell_ind
     return true;
 }
 
-/* Methods form products of several direction components, so that very long and very short directions
- * would overflow. A power of two takes the length out of the direction and into t, without rounding.
- * Returns the exponent; 0, and *scaled not written, for all ordinary rays. */
-static int scale_direction(const knurl_ray *ray, knurl_ray *scaled)
-{
-    double longest = v3_max_component(v3_abs(v3_load(ray->direction)));
-    if ((longest >= 0x1p-64 && longest <= 0x1p64) || !(longest > 0.0) || !isfinite(longest)) return 0;
-    int exponent = ilogb(longest);
-    *scaled = *ray;
-    for (int i = 0; i < 3; i++) scaled->direction[i] = ldexp(ray->direction[i], -exponent);
-    scaled->tmin = ldexp(ray->tmin, exponent);
-    scaled->tmax = ldexp(ray->tmax, exponent);
-    return exponent;
-}
-
 static bool query(const knurl_surface *surface, uint32_t triangle, const knurl_ray *ray, bool any,
                   knurl_hit *hit)
 {
     const shell_space *space = &surface->space;
     if (space->shells[triangle].flags & SHELL_EMPTY) return false;
+    near_ray near;
+    if (!near_ray_make(ray, surface->centre, surface->radius, &near)) return false;
     height_lod lod;
     triangle_frame frame;
     shell_root root;
-    knurl_ray scaled;
     uint32_t steps = 0;
-    int exponent = scale_direction(ray, &scaled);
-    const knurl_ray *traced = exponent != 0 ? &scaled : ray;
     triangle_frame_load_shape(space, triangle, &frame);
-    if ((surface->method->flags & KNURL_METHOD_EXACT) && ray_misses_prism(&frame, traced)) return false;
+    if ((surface->method->flags & KNURL_METHOD_EXACT) && ray_misses_prism(&frame, near.ray)) return false;
     height_lod_make(space, (double)ray->lod, &lod);
     triangle_frame_load_texels(space, triangle, &lod, &frame);
-    method_query q = {space, &lod, &frame, traced, any, &root, &steps};
+    method_query q = {space, &lod, &frame, near.ray, any, &root, &steps};
     bool found = surface->method->intersect(surface->data, &q);
-    if (found && exponent != 0) root.t = ldexp(root.t, -exponent);
-    found = found && isfinite(root.t);
+    found = found && isfinite(near_ray_caller_t(&near, root.t));
     if (!hit) return found;
     hit->steps += steps;
     if (found) {
-        shell_hit_fill(space, &lod, &frame, triangle, ray, &root, hit);
+        shell_hit_fill(space, &lod, &frame, triangle, near.ray, &root, hit);
+        hit->t = near_ray_caller_t(&near, root.t);
         hit->object = hit->instance = 0;
     }
     return found;

@@ -4,6 +4,7 @@
  * heights and corners bound its points, and boxes that the ray misses are dropped. A piece that is
  * small and nearly affine holds at most one root per texel, found by Newton's method. This serves
  * folded shells, where a point may have several inverses, and rays the curve cannot follow. */
+#include "shell/near.h"
 #include "shell/shell.h"
 
 #include <float.h>
@@ -401,22 +402,6 @@ static double near_reciprocal(double x)
     return 1.0 / (fabs(x) < 1e-300 ? copysign(1e-300, x) : x);
 }
 
-/* a - b in two parts whose sum is exact (Knuth 1969, TwoSum). */
-static double difference(double a, double b, double *rest)
-{
-    double sum = a - b, bb = sum - a;
-    *rest = (a - (sum - bb)) + (-b - bb);
-    return sum;
-}
-
-/* The ray's point at parameter t relative to `base`, rounded once: from a far origin the pieces would
- * otherwise be judged with the rounding of that distance. */
-static double point_near(double origin, double direction, double base, double t)
-{
-    double rest, relative = difference(origin, base, &rest);
-    return fma(t, direction, relative) + rest;
-}
-
 static void search_make(const shell_space *space, const height_lod *lod, knurl_bounds_kind kind,
                         const triangle_frame *f, const knurl_ray *ray, search *s)
 {
@@ -428,9 +413,9 @@ static void search_make(const shell_space *space, const height_lod *lod, knurl_b
     s->t0 = t0;
     s->tmin = ray->tmin - t0;
     s->tmax = ray->tmax - t0;
-    s->origin = v3(point_near(ray->origin[0], ray->direction[0], f->base.x, t0),
-                   point_near(ray->origin[1], ray->direction[1], f->base.y, t0),
-                   point_near(ray->origin[2], ray->direction[2], f->base.z, t0));
+    s->origin = v3(near_point(ray->origin[0], ray->direction[0], f->base.x, t0),
+                   near_point(ray->origin[1], ray->direction[1], f->base.y, t0),
+                   near_point(ray->origin[2], ray->direction[2], f->base.z, t0));
     vec3 d = v3_normalize(s->direction), a = v3_abs(d);
     vec3 least = a.x <= a.y && a.x <= a.z ? v3(1, 0, 0) : a.y <= a.z ? v3(0, 1, 0) : v3(0, 0, 1);
     s->across1 = v3_normalize(v3_cross(d, least));

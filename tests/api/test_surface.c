@@ -288,6 +288,42 @@ static void hits_do_not_depend_on_tmax(void **state)
     knurl_context_release(context);
 }
 
+/* The line of a ray decides what it hits, not where on it the origin is; and far rays end as soon as near
+ * ones. */
+static void far_origins_change_nothing(void **state)
+{
+    (void)state;
+    knurl_context *context = make_context();
+    static const float bent[9] = {0.1f, 1, 0, 0.3f, 1, 0, 0, 1, -0.2f};
+    static const float lean[9] = {0.1f, 1, 0, 0.3f, 2, 0, 0, 1.5f, -0.2f};
+    for (int32_t m = 0; m < knurl_method_count(); m++)
+        for (int directions = 0; directions < 2; directions++) {
+            if (directions && knurl_method_flags(m) & KNURL_METHOD_NATIVE) continue;
+            knurl_surface_def def = triangle_def(bent, random_map(context, 16), 0.1);
+            def.method = knurl_method_name(m);
+            if (directions) def.mesh.directions = lean;
+            if (knurl_method_flags(m) & KNURL_METHOD_NATIVE) def.method = "tessellation:rate=0.25";
+            knurl_surface *surface = create(context, &def);
+            for (int e = 0; e <= 300; e += 3) {
+                double far = pow(10.0, e), off[3] = {far, far, far}, beside[3] = {0.3 * far, -far, 0};
+                double origin[3] = {0.25, far, 0.25}, down[3] = {0, -1, 0}, across[3] = {0, 0, -1};
+                knurl_ray ray = knurl_ray_make(origin, down);
+                knurl_hit hit = {.triangle = KNURL_NO_HIT};
+                assert_true(knurl_surface_intersect(surface, 0, &ray, &hit));
+                assert_true(fabs(hit.position[0] - 0.25) < 0.02 && fabs(hit.position[2] - 0.25) < 0.02);
+                assert_true(fabs(hit.t - far) <= 0.2 + 1e-15 * far && hit.steps < 10000);
+                assert_true(knurl_surface_occluded(surface, 0, &ray));
+                if (e == 0) continue;
+                ray = knurl_ray_make(off, across);
+                assert_false(knurl_surface_intersect(surface, 0, &ray, &hit));
+                ray = knurl_ray_make(beside, down);
+                assert_false(knurl_surface_intersect(surface, 0, &ray, &hit));
+            }
+            knurl_surface_release(surface);
+        }
+    knurl_context_release(context);
+}
+
 static void methods_refuse_bad_parameters(void **state)
 {
     (void)state;
@@ -329,6 +365,7 @@ int main(void)
         cmocka_unit_test(huge_heights_are_refused),      cmocka_unit_test(fine_texels_end),
         cmocka_unit_test(seams_know_wrapping),           cmocka_unit_test(directions_make_a_frustum),
         cmocka_unit_test(methods_refuse_bad_parameters), cmocka_unit_test(hits_do_not_depend_on_tmax),
+        cmocka_unit_test(far_origins_change_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
