@@ -43,6 +43,14 @@ static int check_outputs(command_session *session, const bench_options *options)
     return code;
 }
 
+/* Whether there are rows, and each says why it holds nothing. */
+static bool nothing_measured(const bench_results *results)
+{
+    for (size_t i = 0; i < results->row_count; i++)
+        if (!results->rows[i].failure[0]) return false;
+    return results->row_count > 0;
+}
+
 /* All scenes; what was finished before a failure is saved too. */
 static int run(command_session *session, const bench_options *options)
 {
@@ -56,6 +64,8 @@ static int run(command_session *session, const bench_options *options)
     if (interrupted)
         code = session_fail_with(session, CODE_INTERRUPTED, "interrupted; %zu rows were finished%s",
                                  results.row_count, options->json || options->csv ? " and are saved" : "");
+    if (code == CODE_DONE && saved == CODE_DONE && nothing_measured(&results))
+        code = session_fail_with(session, CODE_LIMIT, "no method could be measured; the rows say why");
     bench_results_free(&results);
     return code != CODE_DONE ? code : saved;
 }

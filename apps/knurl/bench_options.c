@@ -40,7 +40,7 @@ static const struct argp_option option_list[] = {
     {"heat-map", KEY_HEAT_MAP, "FILE.png", 0,
      "Pictures of the steps of primary rays, log scale: FILE.SCENE.N.png for method N from 0", 1},
     {"rounds", KEY_ROUNDS, "N", 0, "Times that methods take turns (default 5); medians are reported", 1},
-    {"count", KEY_COUNT, "N", 0, "Rays of each set (default 100000)", 1},
+    {"count", KEY_COUNT, "N", 0, "Rays of each set, 64 to 67108864 (default 100000)", 1},
     {"seed", KEY_SEED, "N", 0, "Other random rays (default 0)", 1},
     {"reference", KEY_REFERENCE, "METHOD", 0,
      "Count disagreement with this method; default rmip, and for rmip itself a variant of it", 1},
