@@ -110,8 +110,8 @@ assert (data["lod"], data["disp_scale"], data["tile_scale"]) == (1.5, 2, 3)
 assert all(r["reference"] == "rmip" and r["missed"] == 0 and r["dt_p99"] == 0 for r in data["results"])'
 expect_text stderr.txt "primary"
 
-# Nothing to start from, and a method that does not fit, are rows with a reason.
-expect 0 "$knurl" bench $surface --methods rmip --rays primary,diffuse --count 600 --rounds 1 --json small.json \
+# A method that does not fit is rows with a reason, and status 4 if it was the only one.
+expect 4 "$knurl" bench $surface --methods rmip --rays primary,diffuse --count 600 --rounds 1 --json small.json \
     --memory-limit 2K
 expect_text stdout.txt "rmip: "
 "$python" -c '
