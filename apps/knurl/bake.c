@@ -66,9 +66,7 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         options->format = value_choice(state, "--format", argument, format_names);
         break;
     case ARGP_KEY_ARG:
-        if (options->scene)
-            argp_error(state, "found '%s' after scene '%s', expected one scene", argument, options->scene);
-        options->scene = argument;
+        take_scene(state, argument, &options->scene);
         break;
     case ARGP_KEY_END:
         if (!options->scene) argp_error(state, "the scene file is missing");

@@ -31,6 +31,9 @@ typedef struct displacement_options {
 
 extern const struct argp general_argp, method_argp, displacement_argp;
 
+/* For ARGP_KEY_ARG of commands that work on one scene. */
+void take_scene(struct argp_state *state, const char *argument, const char **scene);
+
 /* For struct argp's help_filter: leaves out argp's remark on short options, which newcomers stumble over. */
 char *help_filter(int key, const char *text, void *input);
 

@@ -66,6 +66,12 @@ static const struct argp_option general_list[] = {
 
 const struct argp general_argp = {general_list, parse_general, NULL, NULL, NULL, NULL, NULL};
 
+void take_scene(struct argp_state *state, const char *argument, const char **scene)
+{
+    if (*scene) argp_error(state, "found '%s' after scene '%s', expected one scene", argument, *scene);
+    *scene = argument;
+}
+
 /* ---- method ---- */
 
 method_options method_options_default(void)

@@ -246,6 +246,11 @@ def mean(values):
     return sum(known) / len(known) if known else math.nan
 
 
+def geometric_mean(values):
+    known = [math.log(v) for v in values if v > 0]
+    return math.exp(sum(known) / len(known)) if known else math.nan
+
+
 def fail(text):
     print(text, file=sys.stderr)
     sys.exit(2)

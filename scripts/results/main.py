@@ -42,6 +42,10 @@ def write_index(session):
         if os.path.exists(path):
             with open(path) as file:
                 lines.append("| [%s](%s.md) | %s |" % (name, name, file.readline().strip("# \n")))
+    for name, title in (("curved-bases", "Marching methods on a curved base"),
+                        ("release", "Figures of the README, truth and watertightness")):
+        if os.path.exists(os.path.join(session.out, name + ".md")):
+            lines.append("| [%s](%s.md) | %s (kept by hand) |" % (name, name, title))
     with open(os.path.join(session.out, "README.md"), "w") as file:
         file.write("\n".join(lines) + "\n")
 

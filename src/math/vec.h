@@ -101,6 +101,14 @@ static inline double v3_length(vec3 a)
 {
     return sqrt(v3_dot(a, a));
 }
+/* 1 / a, finite where a component is zero or so small that its reciprocal would overflow. */
+static inline vec3 v3_reciprocal(vec3 a)
+{
+    double x = fabs(a.x) < 1e-300 ? copysign(1e-300, a.x) : a.x;
+    double y = fabs(a.y) < 1e-300 ? copysign(1e-300, a.y) : a.y;
+    double z = fabs(a.z) < 1e-300 ? copysign(1e-300, a.z) : a.z;
+    return v3(1.0 / x, 1.0 / y, 1.0 / z);
+}
 static inline vec3 v3_abs(vec3 a)
 {
     return v3(fabs(a.x), fabs(a.y), fabs(a.z));

@@ -3,18 +3,12 @@
 
 #include <float.h>
 
-static double reciprocal(double x)
-{
-    return 1.0 / (fabs(x) < 1e-300 ? copysign(1e-300, x) : x);
-}
-
 void cell_boxes_make(const triangle_frame *f, const knurl_ray *ray, cell_boxes *t)
 {
     const double *m = f->inverse_uv;
     t->frame = f;
     t->origin = v3_sub(v3_load(ray->origin), f->base);
-    t->inverse =
-        v3(reciprocal(ray->direction[0]), reciprocal(ray->direction[1]), reciprocal(ray->direction[2]));
+    t->inverse = v3_reciprocal(v3_load(ray->direction));
     t->px = v3_mad(v3_scale(f->pe, m[0]), m[2], f->pf);
     t->py = v3_mad(v3_scale(f->pe, m[1]), m[3], f->pf);
     t->nx = v3_mad(v3_scale(f->ne, m[0]), m[2], f->nf);

@@ -9,13 +9,7 @@ void shell_root_at(const shell_space *space, const height_lod *lod, const triang
     root->b2 = b2;
     root->x = f->x[0] + b1 * f->xe + b2 * f->xf;
     root->y = f->y[0] + b1 * f->ye + b2 * f->yf;
-    int64_t i1 = 0, j1 = 0;
-    if (lod->blend > 0.0) {
-        i1 = (int64_t)floor_d((root->x + (double)f->origin_x + 0.5) * lod->ratio[0] - 0.5);
-        j1 = (int64_t)floor_d((root->y + (double)f->origin_y + 0.5) * lod->ratio[1] - 0.5);
-    }
-    height_patch_load(space, lod, f, (int64_t)floor_d(root->x), (int64_t)floor_d(root->y), i1, j1,
-                      &root->patch);
+    height_patch_find(space, lod, f, root->x, root->y, &root->patch);
 }
 
 /* P + h N / |N|, or P + h N. Where opposing normals cancel there is no direction to go. */
@@ -84,12 +78,7 @@ static double height_at(const shell_space *space, const height_lod *lod, double 
 {
     static const triangle_frame at_zero; /* of which only the origin, (0, 0), is read */
     height_patch patch;
-    int64_t i1 = 0, j1 = 0;
-    if (lod->blend > 0.0) {
-        i1 = (int64_t)floor_d((x + 0.5) * lod->ratio[0] - 0.5);
-        j1 = (int64_t)floor_d((y + 0.5) * lod->ratio[1] - 0.5);
-    }
-    height_patch_load(space, lod, &at_zero, (int64_t)floor_d(x), (int64_t)floor_d(y), i1, j1, &patch);
+    height_patch_find(space, lod, &at_zero, x, y, &patch);
     return height_patch_at(&patch, x, y);
 }
 

@@ -161,6 +161,17 @@ void height_patch_load(const shell_space *space, const height_lod *lod, const tr
     patch->max += rounding;
 }
 
+void height_patch_find(const shell_space *space, const height_lod *lod, const triangle_frame *f, double x,
+                       double y, height_patch *patch)
+{
+    int64_t i1 = 0, j1 = 0;
+    if (lod->blend > 0.0) {
+        i1 = (int64_t)floor_d((x + (double)f->origin_x + 0.5) * lod->ratio[0] - 0.5);
+        j1 = (int64_t)floor_d((y + (double)f->origin_y + 0.5) * lod->ratio[1] - 0.5);
+    }
+    height_patch_load(space, lod, f, (int64_t)floor_d(x), (int64_t)floor_d(y), i1, j1, patch);
+}
+
 knurl_range shell_height_range(const shell_space *space, const height_lod *lod, knurl_bounds_kind kind,
                                const triangle_frame *frame, double x0, double y0, double x1, double y1)
 {

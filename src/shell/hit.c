@@ -68,12 +68,7 @@ static double height_anywhere(const shell_space *space, const height_lod *lod, c
                               double x, double y)
 {
     height_patch patch;
-    int64_t i = (int64_t)floor_d(x), j = (int64_t)floor_d(y), i1 = 0, j1 = 0;
-    if (lod->blend > 0.0) {
-        i1 = (int64_t)floor_d((x + (double)f->origin_x + 0.5) * lod->ratio[0] - 0.5);
-        j1 = (int64_t)floor_d((y + (double)f->origin_y + 0.5) * lod->ratio[1] - 0.5);
-    }
-    height_patch_load(space, lod, f, i, j, i1, j1, &patch);
+    height_patch_find(space, lod, f, x, y, &patch);
     return height_patch_at(&patch, x, y);
 }
 

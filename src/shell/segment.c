@@ -78,14 +78,3 @@ bool shell_segments_make(const triangle_frame *f, const knurl_ray *ray, shell_se
     }
     return true;
 }
-
-void segment_patch(const shell_space *space, const height_lod *lod, const triangle_frame *f, double x,
-                   double y, height_patch *patch)
-{
-    int64_t i1 = 0, j1 = 0;
-    if (lod->blend > 0.0) {
-        i1 = (int64_t)floor_d((x + (double)f->origin_x + 0.5) * lod->ratio[0] - 0.5);
-        j1 = (int64_t)floor_d((y + (double)f->origin_y + 0.5) * lod->ratio[1] - 0.5);
-    }
-    height_patch_load(space, lod, f, (int64_t)floor_d(x), (int64_t)floor_d(y), i1, j1, patch);
-}

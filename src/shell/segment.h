@@ -56,11 +56,6 @@ typedef struct shell_segments {
  * marching methods of this library then call shell_subdivide(), which is slow and exact. */
 bool shell_segments_make(const triangle_frame *frame, const knurl_ray *ray, shell_segments *segments);
 
-/* The bilinear piece of h at any position of the frame's texels, both levels where the level of detail blends
- * two. */
-void segment_patch(const shell_space *space, const height_lod *lod, const triangle_frame *frame, double x,
-                   double y, height_patch *patch);
-
 /* The point at fraction f. */
 static inline segment_point segment_at(const shell_segment *s, double f)
 {

@@ -6,7 +6,7 @@
 double segment_sample(segment_walk *w, double f, segment_point *point, height_patch *patch)
 {
     *point = segment_at(w->segment, f);
-    segment_patch(w->space, w->lod, w->frame, point->x, point->y, patch);
+    height_patch_find(w->space, w->lod, w->frame, point->x, point->y, patch);
     w->steps++;
     return point->h - height_patch_at(patch, point->x, point->y);
 }
@@ -26,7 +26,7 @@ bool segment_accept(segment_walk *w, double f)
     segment_point p = segment_at(w->segment, f);
     shell_root root = {.t = p.t, .b1 = p.b1, .b2 = p.b2, .x = p.x, .y = p.y};
     if (!(root.t >= w->ray->tmin && root.t <= w->ray->tmax)) return false;
-    segment_patch(w->space, w->lod, w->frame, p.x, p.y, &root.patch);
+    height_patch_find(w->space, w->lod, w->frame, p.x, p.y, &root.patch);
     w->root = root;
     return true;
 }

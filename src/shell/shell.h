@@ -112,6 +112,10 @@ typedef struct height_patch {
 void height_patch_load(const shell_space *space, const height_lod *lod, const triangle_frame *frame,
                        int64_t i, int64_t j, int64_t i1, int64_t j1, height_patch *patch);
 
+/* The piece at any position of the frame's texels, of both levels where the level of detail blends two. */
+void height_patch_find(const shell_space *space, const height_lod *lod, const triangle_frame *frame, double x,
+                       double y, height_patch *patch);
+
 static inline double height_patch_at(const height_patch *patch, double x, double y)
 {
     double dx = x - patch->x, dy = y - patch->y;

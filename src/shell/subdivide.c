@@ -397,11 +397,6 @@ static void push_halves(const triangle_frame *f, piece *stack, int *top, const p
     stack[(*top)++] = (piece){{p->b1[apex], m1, p->b1[k]}, {p->b2[apex], m2, p->b2[k]}, depth, false};
 }
 
-static double near_reciprocal(double x)
-{
-    return 1.0 / (fabs(x) < 1e-300 ? copysign(1e-300, x) : x);
-}
-
 static void search_make(const shell_space *space, const height_lod *lod, knurl_bounds_kind kind,
                         const triangle_frame *f, const knurl_ray *ray, search *s)
 {
@@ -420,8 +415,7 @@ static void search_make(const shell_space *space, const height_lod *lod, knurl_b
     vec3 least = a.x <= a.y && a.x <= a.z ? v3(1, 0, 0) : a.y <= a.z ? v3(0, 1, 0) : v3(0, 0, 1);
     s->across1 = v3_normalize(v3_cross(d, least));
     s->across2 = v3_cross(d, s->across1);
-    s->inverse =
-        v3(near_reciprocal(s->direction.x), near_reciprocal(s->direction.y), near_reciprocal(s->direction.z));
+    s->inverse = v3_reciprocal(s->direction);
     s->pad = 16.0 * DBL_EPSILON * (v3_max_component(v3_abs(s->origin)) + f->size + fabs(f->s0) + fabs(f->s1));
 }
 
