@@ -138,6 +138,9 @@ static int bench_build(int32_t size, int threads, int rounds)
         knurl_heightmap *map = NULL;
         knurl_error error;
         if (!image || knurl_heightmap_create(context, &def, &map, &error) != KNURL_OK) return 4;
+        /* The RMIP table is made when it is asked for. */
+        (void)knurl_heightmap_bounds(map, KNURL_BOUNDS_RMIP, 0.0, 0.0, 1.0, 1.0, KNURL_WRAP_REPEAT,
+                                     KNURL_WRAP_REPEAT, 0.0);
         if (i < 0) {
             knurl_heightmap_bytes memory = knurl_heightmap_memory(map);
             bytes = memory.samples + memory.minmax + memory.rmip;

@@ -22,6 +22,9 @@ typedef enum ray_kind {
 } ray_kind;
 extern const char *const ray_kind_names[RAYS_KINDS + 1]; /* NULL at the end */
 
+/* How rays are handed to the library; bits. */
+typedef enum call_kind { CALLS_SINGLE = 1, CALLS_BATCH = 2 } call_kind;
+
 typedef struct bench_options {
     char **scenes;
     int scene_count;
@@ -29,11 +32,14 @@ typedef struct bench_options {
     int method_count;
     ray_kind kinds[RAYS_KINDS];
     int kind_count;
+    unsigned calls; /* call_kind; 0: single calls on one thread, batches on all */
     const char *json, *csv, *heat_map, *reference, *camera;
     int rounds;
     size_t count; /* rays of a set */
     uint32_t seed;
     double lod;
+    double lift;                                  /* of secondary rays' starts, in diagonals of the bounds */
+    bool displaced_only;                          /* leave undisplaced meshes out */
     double disp_scale, tile_scale;                /* on top of the displacement options */
     int frame_width, frame_height, frame_samples; /* 0: no frames */
     int rmip_cell;                                /* 0: the library's default */
@@ -53,6 +59,7 @@ typedef struct subject {
     uint32_t flags;     /* KNURL_METHOD_* */
     knurl_context *context;
     knurl_description *description;
+    uint32_t instance_count; /* of the file; the description may have fewer in use */
     knurl_scene *scene;
     double build_ms; /* maps' structures, shells and hierarchy; not reading files */
     knurl_scene_memory memory;
@@ -87,6 +94,7 @@ void ray_sets_free(ray_set sets[RAYS_KINDS]);
 typedef struct bench_row {
     const char *scene, *method, *rays;
     int threads;
+    const char *calls; /* "single", "batch"; NULL for pictures */
     size_t count;
     spread mrays;     /* of wall-clock time */
     double mrays_cpu; /* of the processor time of all threads, median */
@@ -127,6 +135,16 @@ void bench_table_subject(FILE *out, const subject *s, const char *reference);
 void bench_table_rows(FILE *out, const bench_row *rows, size_t count, bool heading);
 
 /* ---- measuring ---- */
+
+/* Wall-clock time, and processor time of all threads, which a busy machine disturbs less. */
+typedef struct run_time {
+    double wall, processor;
+} run_time;
+
+/* Traces a set on one thread or on all of the context's: hits[i] or, of any-hit sets, occluded[i] is ray i's.
+ * `taken` may be NULL. Returns an exit code. */
+int bench_trace(command_session *session, const subject *s, const ray_set *set, call_kind calls, int threads,
+                knurl_hit *hits, uint8_t *occluded, run_time *taken);
 
 /* Everything about one scene file, appended to the results row by row. */
 int bench_scene(command_session *session, const bench_options *options, const char *path,

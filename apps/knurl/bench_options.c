@@ -9,6 +9,7 @@
 enum {
     KEY_METHODS = 0x200,
     KEY_RAYS,
+    KEY_CALLS,
     KEY_JSON,
     KEY_CSV,
     KEY_ROUNDS,
@@ -20,6 +21,8 @@ enum {
     KEY_HEAT_MAP,
     KEY_CAMERA,
     KEY_RMIP_CELL,
+    KEY_LIFT,
+    KEY_DISPLACED_ONLY,
     KEY_DISP_SCALE,
     KEY_TILE_SCALE
 };
@@ -34,6 +37,11 @@ static const struct argp_option option_list[] = {
      "primary, grazing, diffuse, diffuse-shuffled, occlusion, inside, inside-shuffled, or none; default "
      "primary,grazing,diffuse,occlusion",
      1},
+    {"calls", KEY_CALLS, "A,B", 0,
+     "single: a call for each ray; batch: calls for blocks of rays; or both; on one thread and on all. "
+     "Default: "
+     "single on one thread, batch on all",
+     1},
     {"frame", KEY_FRAME, "WxHxSPP", 0, "Also time a path-traced picture, e.g. 320x180x4", 1},
     {"json", KEY_JSON, "FILE", 0, "Write the results as JSON; - is standard output", 1},
     {"csv", KEY_CSV, "FILE", 0, "Write the results as CSV; - is standard output", 1},
@@ -42,6 +50,10 @@ static const struct argp_option option_list[] = {
     {"rounds", KEY_ROUNDS, "N", 0, "Times that methods take turns (default 5); medians are reported", 1},
     {"count", KEY_COUNT, "N", 0, "Rays of each set, 64 to 67108864 (default 100000)", 1},
     {"seed", KEY_SEED, "N", 0, "Other random rays (default 0)", 1},
+    {"lift", KEY_LIFT, "X", 0,
+     "Start secondary rays this far off the surface, in diagonals of the scene's bounds (default 0), so that "
+     "methods with slightly different surfaces do not meet their own at once",
+     1},
     {"reference", KEY_REFERENCE, "METHOD", 0,
      "Count disagreement with this method; default rmip, and for rmip itself a variant of it", 1},
     {"camera", KEY_CAMERA, "N|NAME", 0,
@@ -49,6 +61,7 @@ static const struct argp_option option_list[] = {
     {"lod", KEY_LOD, "X", 0, "Level of detail of all rays (default 0, the finest)", 1},
     {"rmip-cell", KEY_RMIP_CELL, "N", 0, "Texels per side of a cell of the RMIP table: 1 to 32 (default 8)",
      1},
+    {"displaced-only", KEY_DISPLACED_ONLY, NULL, 0, "Leave undisplaced meshes out of the scene", 2},
     {"disp-scale", KEY_DISP_SCALE, "X", 0, "Multiply every displacement, offset included", 2},
     {"tile-scale", KEY_TILE_SCALE, "X", 0, "Multiply every map's tiling", 2},
     {0}};
@@ -111,6 +124,18 @@ static void parse_rays(struct argp_state *state, const char *text, bench_options
     free(names);
 }
 
+static unsigned parse_calls(struct argp_state *state, const char *text)
+{
+    static const char *const names[] = {"single", "batch", "both", NULL};
+    static const unsigned kinds[] = {CALLS_SINGLE, CALLS_BATCH, CALLS_SINGLE | CALLS_BATCH};
+    unsigned calls = 0;
+    int count;
+    char **list = split_list(state, "--calls", text, &count);
+    for (int i = 0; i < count; i++) calls |= kinds[value_choice(state, "--calls", list[i], names)];
+    free(list);
+    return calls;
+}
+
 static void parse_frame(struct argp_state *state, const char *text, bench_options *options)
 {
     static const char expected[] = "WIDTHxHEIGHTxSAMPLES such as 320x180x4";
@@ -154,6 +179,9 @@ static bool parse_output(int key, char *argument, struct argp_state *state, benc
         break;
     case KEY_RAYS:
         parse_rays(state, argument, options);
+        break;
+    case KEY_CALLS:
+        options->calls = parse_calls(state, argument);
         break;
     case KEY_JSON:
         options->json = argument;
@@ -205,6 +233,12 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         if (options->rmip_cell & (options->rmip_cell - 1))
             argp_error(state, "--rmip-cell: found '%s', expected 1, 2, 4, 8, 16 or 32", argument);
         break;
+    case KEY_LIFT:
+        options->lift = value_real(state, "--lift", argument, 0, 1);
+        break;
+    case KEY_DISPLACED_ONLY:
+        options->displaced_only = true;
+        break;
     case KEY_DISP_SCALE:
         options->disp_scale = parse_scale(state, "--disp-scale", argument);
         break;
@@ -225,7 +259,8 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
 
 static const char documentation[] =
     "Measure intersection methods side by side on the same rays.\v"
-    "Every set is traced with one thread and with all; methods take turns, so that a busy machine "
+    "Every set is traced with one thread and with all (--calls tells how); methods take turns, so that a "
+    "busy machine "
     "disturbs all of them alike. Results are also compared with an exact method: hits that are missed "
     "or false, and |dt| relative to the diagonal of the scene's bounds. A method that cannot be built, "
     "say for lack of memory (--memory-limit is for each), gives rows that say why. Ctrl-C keeps the "

@@ -135,7 +135,7 @@ static int make_primary(command_session *session, const bench_options *options,
 /* Where a camera ray met the surface. */
 typedef struct start_point {
     double position[3], normal[3]; /* the geometric normal, towards the camera */
-    double error;
+    double offset;                 /* along the normal, of rays that start here */
 } start_point;
 
 typedef struct start_points {
@@ -143,9 +143,20 @@ typedef struct start_points {
     size_t count;
 } start_points;
 
-static int find_starts(command_session *session, const knurl_scene *scene, const ray_set *primary,
-                       start_points *starts)
+/* The diagonal of the scene's bounds. */
+static double diagonal_of(const knurl_scene *scene)
 {
+    double lower[3], upper[3], extent[3];
+    knurl_scene_bounds(scene, lower, upper);
+    for (int i = 0; i < 3; i++) extent[i] = upper[i] - lower[i];
+    return sqrt(dot(extent, extent));
+}
+
+/* Twice the bound on the hit's error, as the renderer's rays do, and the lift. */
+static int find_starts(command_session *session, const bench_options *options, const knurl_scene *scene,
+                       const ray_set *primary, start_points *starts)
+{
+    const double lift = options->lift > 0 ? options->lift * diagonal_of(scene) : 0;
     knurl_hit *hits = malloc(primary->count * sizeof *hits);
     starts->points = malloc(primary->count * sizeof *starts->points);
     knurl_error error = {0};
@@ -163,17 +174,16 @@ static int find_starts(command_session *session, const knurl_scene *scene, const
             point->position[axis] = hits[i].position[axis];
             point->normal[axis] = side * hits[i].ng[axis];
         }
-        point->error = hits[i].error;
+        point->offset = 2 * hits[i].error + lift;
     }
     free(hits);
     return code;
 }
 
-/* Starts off the surface by twice the bound on the hit's error, as the renderer's rays do. */
 static knurl_ray leave(const bench_options *options, const start_point *start, const double direction[3])
 {
     double origin[3];
-    for (int i = 0; i < 3; i++) origin[i] = start->position[i] + 2 * start->error * start->normal[i];
+    for (int i = 0; i < 3; i++) origin[i] = start->position[i] + start->offset * start->normal[i];
     knurl_ray ray = knurl_ray_make(origin, direction);
     ray.lod = (float)options->lod;
     return ray;
@@ -277,6 +287,25 @@ static void make_inside(const bench_options *options, const knurl_scene *scene, 
     }
 }
 
+/* Rays that leave a scene cost next to nothing and say nothing; closed ones may have cracks along seams. */
+static int check_closed(command_session *session, const knurl_scene *scene, ray_set *set)
+{
+    knurl_hit *hits = malloc(set->count * sizeof *hits);
+    if (!hits) return fail_memory(session);
+    knurl_error error = {0};
+    size_t left = 0;
+    int code = CODE_DONE;
+    if (knurl_scene_intersect_batch(scene, set->rays, set->count, hits, progress_update, &session->progress,
+                                    NULL, &error) != KNURL_OK)
+        code = session_fail(session, &error);
+    for (size_t i = 0; code == CODE_DONE && i < set->count; i++) left += hits[i].triangle == KNURL_NO_HIT;
+    if (left > set->count / 100)
+        snprintf(set->failure, sizeof set->failure,
+                 "the scene is not closed: %zu of %zu rays from its centre hit nothing", left, set->count);
+    free(hits);
+    return code;
+}
+
 /* ---- all of them ---- */
 
 static void shuffle(const bench_options *options, ray_kind kind, ray_set *set)
@@ -307,6 +336,10 @@ static int make_set(command_session *session, const bench_options *options,
         make_bounces(options, starts, kind, set);
     else
         make_inside(options, scene, set);
+    if (!leaves) {
+        int code = check_closed(session, scene, set);
+        if (code != CODE_DONE) return code;
+    }
     if (kind == RAYS_DIFFUSE_SHUFFLED || kind == RAYS_INSIDE_SHUFFLED) shuffle(options, kind, set);
     return CODE_DONE;
 }
@@ -317,7 +350,7 @@ int ray_sets_make(command_session *session, const bench_options *options,
     start_points starts = {0};
     memset(sets, 0, RAYS_KINDS * sizeof *sets);
     int code = make_primary(session, options, description, scene, &sets[RAYS_PRIMARY]);
-    if (code == CODE_DONE) code = find_starts(session, scene, &sets[RAYS_PRIMARY], &starts);
+    if (code == CODE_DONE) code = find_starts(session, options, scene, &sets[RAYS_PRIMARY], &starts);
     for (int i = 0; i < options->kind_count && code == CODE_DONE; i++) {
         ray_kind kind = options->kinds[i];
         if (kind != RAYS_PRIMARY)

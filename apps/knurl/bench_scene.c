@@ -1,12 +1,12 @@
 /* bench_scene.c: everything that is measured on one scene.
  *
- * Per ray set: each method traces it once for its hits and steps, then methods take turns for the clock. */
+ * Per ray set: each method traces it once with each kind of calls for its hits and steps, then methods and
+ * kinds of calls take turns for the clock. */
 #include "bench.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 /* A scene whose hits count as exact. */
 typedef struct reference {
@@ -31,6 +31,7 @@ typedef struct scene_bench {
     double *t, *scratch;
     uint32_t *steps;
     double diagonal;
+    int threads;            /* all of them */
     size_t runs_done, runs; /* timed runs, for progress */
 } scene_bench;
 
@@ -140,26 +141,12 @@ static void close_bench(scene_bench *b)
 
 /* ---- hits and steps ---- */
 
-static bool keep_going(void *user, const char *stage, double fraction)
-{
-    (void)user;
-    (void)stage;
-    (void)fraction;
-    return !signals_stop_requested();
-}
-
-/* Traces a set on all threads; t and steps are in b->t and b->steps. A blocked ray of an any-hit set has
+/* Traces a set on all threads; t and steps are in `t` and b->steps. A blocked ray of an any-hit set has
  * t 0, and steps mean nothing. */
-static int trace_set(scene_bench *b, const subject *s, const ray_set *set, double *t)
+static int trace_set(scene_bench *b, const subject *s, const ray_set *set, call_kind calls, double *t)
 {
-    knurl_error error = {0};
-    knurl_status status = set->any_hit
-                              ? knurl_scene_occluded_batch(s->scene, set->rays, set->count, b->occluded,
-                                                           keep_going, NULL, NULL, &error)
-                              : knurl_scene_intersect_batch(s->scene, set->rays, set->count, b->hits,
-                                                            keep_going, NULL, NULL, &error);
-    if (status == KNURL_INTERRUPTED) return CODE_INTERRUPTED;
-    if (status != KNURL_OK) return session_fail(b->session, &error);
+    int code = bench_trace(b->session, s, set, calls, b->threads, b->hits, b->occluded, NULL);
+    if (code != CODE_DONE) return code;
     for (size_t i = 0; i < set->count; i++) {
         if (set->any_hit) {
             t[i] = b->occluded[i] ? 0 : NAN;
@@ -176,14 +163,14 @@ static int trace_references(scene_bench *b, const ray_set *set)
     int code = CODE_DONE;
     for (int i = 0; i < b->reference_count && code == CODE_DONE; i++)
         if (!b->references[i].subject.failure[0])
-            code = trace_set(b, &b->references[i].subject, set, b->references[i].t);
+            code = trace_set(b, &b->references[i].subject, set, CALLS_BATCH, b->references[i].t);
     return code;
 }
 
-static int find_outcome(scene_bench *b, int method, const ray_set *set, outcome *result)
+static int find_outcome(scene_bench *b, int method, const ray_set *set, call_kind calls, outcome *result)
 {
     const reference *exact = &b->references[b->reference_of[method]];
-    int code = trace_set(b, &b->subjects[method], set, b->t);
+    int code = trace_set(b, &b->subjects[method], set, calls, b->t);
     if (code != CODE_DONE) return code;
     result->steps = set->any_hit ? (step_statistics){NAN, NAN, NAN}
                                  : step_statistics_of(b->steps, set->count, b->scratch);
@@ -196,101 +183,57 @@ static int find_outcome(scene_bench *b, int method, const ray_set *set, outcome 
 
 /* ---- time ---- */
 
-/* Wall-clock time, and processor time of all threads, which a busy machine disturbs less. */
-typedef struct run_time {
-    double wall, processor;
-} run_time;
-
-static run_time time_now(void)
-{
-    struct timespec processor;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &processor);
-    return (run_time){seconds_now(), (double)processor.tv_sec + 1e-9 * (double)processor.tv_nsec};
-}
-
-static run_time time_since(run_time start)
-{
-    run_time now = time_now();
-    return (run_time){now.wall - start.wall, now.processor - start.processor};
-}
-
-/* One call per ray, on this thread. */
-static int time_calls(scene_bench *b, const subject *s, const ray_set *set, run_time *taken)
-{
-    enum { BLOCK = 1024 }; /* Ctrl-C is looked at between blocks */
-    run_time start = time_now();
-    for (size_t begin = 0; begin < set->count; begin += BLOCK) {
-        size_t end = set->count - begin < BLOCK ? set->count : begin + BLOCK;
-        if (set->any_hit)
-            for (size_t i = begin; i < end; i++)
-                b->occluded[i] = knurl_scene_occluded(s->scene, &set->rays[i]);
-        else
-            for (size_t i = begin; i < end; i++)
-                (void)knurl_scene_intersect(s->scene, &set->rays[i], &b->hits[i]);
-        if (signals_stop_requested()) return CODE_INTERRUPTED;
-    }
-    *taken = time_since(start);
-    return CODE_DONE;
-}
-
-static int time_batch(scene_bench *b, const subject *s, const ray_set *set, run_time *taken)
-{
-    knurl_error error = {0};
-    run_time start = time_now();
-    knurl_status status = set->any_hit
-                              ? knurl_scene_occluded_batch(s->scene, set->rays, set->count, b->occluded,
-                                                           keep_going, NULL, NULL, &error)
-                              : knurl_scene_intersect_batch(s->scene, set->rays, set->count, b->hits,
-                                                            keep_going, NULL, NULL, &error);
-    *taken = time_since(start);
-    if (status == KNURL_INTERRUPTED) return CODE_INTERRUPTED;
-    return status == KNURL_OK ? CODE_DONE : session_fail(b->session, &error);
-}
-
 static const char *file_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;
 }
 
-/* Million rays per second, [method * rounds + round]. */
-typedef struct speeds {
-    double *wall, *processor;
-} speeds;
+/* What was found of one ray set, for [calls][method]. */
+enum { CALL_KINDS = 2 };
+static const call_kind call_kinds[CALL_KINDS] = {CALLS_SINGLE, CALLS_BATCH};
+static const char *const call_names[CALL_KINDS] = {"single", "batch"};
 
-/* Methods take turns. */
-static int time_rounds(scene_bench *b, const ray_set *set, int threads, const speeds *found)
+typedef struct measures {
+    outcome *outcomes[CALL_KINDS];
+    /* Million rays per second, [method * rounds + round] */
+    double *wall[CALL_KINDS], *processor[CALL_KINDS];
+} measures;
+
+/* Methods and kinds of calls take turns. */
+static int time_rounds(scene_bench *b, const ray_set *set, int threads, unsigned calls, const measures *found)
 {
     int methods = b->options->method_count, rounds = b->options->rounds;
-    for (int round = 0; round < rounds; round++) {
-        for (int m = 0; m < methods; m++) {
-            const subject *s = &b->subjects[m];
-            double part = (double)b->runs_done++ / (double)b->runs;
-            if (!progress_update(&b->session->progress, file_name(b->path), part)) return CODE_INTERRUPTED;
-            if (s->failure[0]) continue;
-            run_time taken;
-            int code = threads == 1 ? time_calls(b, s, set, &taken) : time_batch(b, s, set, &taken);
-            if (code != CODE_DONE) return code;
-            found->wall[m * rounds + round] = 1e-6 * (double)set->count / taken.wall;
-            found->processor[m * rounds + round] = 1e-6 * (double)set->count / taken.processor;
-        }
+    for (int turn = 0; turn < rounds * methods * CALL_KINDS; turn++) {
+        int kind = turn % CALL_KINDS, m = turn / CALL_KINDS % methods, round = turn / CALL_KINDS / methods;
+        const subject *s = &b->subjects[m];
+        if (!(calls & call_kinds[kind])) continue;
+        double part = (double)b->runs_done++ / (double)b->runs;
+        if (!progress_update(&b->session->progress, file_name(b->path), part)) return CODE_INTERRUPTED;
+        if (s->failure[0]) continue;
+        run_time taken;
+        int code = bench_trace(b->session, s, set, call_kinds[kind], threads, b->hits, b->occluded, &taken);
+        if (code != CODE_DONE) return code;
+        found->wall[kind][m * rounds + round] = 1e-6 * (double)set->count / taken.wall;
+        found->processor[kind][m * rounds + round] = 1e-6 * (double)set->count / taken.processor;
     }
     return CODE_DONE;
 }
 
 /* ---- rows ---- */
 
-static int add_row(scene_bench *b, int method, ray_kind kind, int threads, const speeds *found,
-                   const outcome *result)
+static int add_row(scene_bench *b, int method, ray_kind kind, int threads, int calls, const measures *found)
 {
     const subject *s = &b->subjects[method];
     const ray_set *set = &b->sets[kind];
+    const outcome *result = &found->outcomes[calls][method];
     bench_row *row = bench_results_add(b->results);
     if (!row) return fail_memory(b->session);
     row->scene = b->path;
     row->method = s->method;
     row->rays = ray_kind_names[kind];
     row->threads = threads;
+    row->calls = call_names[calls];
     row->count = set->count;
     describe_reference(b, method, row->reference, sizeof row->reference);
     row->build_ms = s->build_ms;
@@ -300,8 +243,8 @@ static int add_row(scene_bench *b, int method, ray_kind kind, int threads, const
     snprintf(row->failure, sizeof row->failure, "%.*s", (int)sizeof row->failure - 1, failure);
     if (failure[0]) return CODE_DONE;
     size_t rounds = (size_t)b->options->rounds, first = (size_t)method * rounds;
-    row->mrays = spread_of(found->wall + first, rounds);
-    row->mrays_cpu = spread_of(found->processor + first, rounds).median;
+    row->mrays = spread_of(found->wall[calls] + first, rounds);
+    row->mrays_cpu = spread_of(found->processor[calls] + first, rounds).median;
     row->steps = result->steps;
     if (!result->compared) return CODE_DONE;
     row->missed = (double)result->difference.missed;
@@ -311,13 +254,20 @@ static int add_row(scene_bench *b, int method, ray_kind kind, int threads, const
     return CODE_DONE;
 }
 
-static int measure_threads(scene_bench *b, ray_kind kind, int threads, const outcome *outcomes,
-                           const speeds *found)
+/* Kinds of calls that are measured with one thread, or with all. */
+static unsigned calls_for(const bench_options *options, int threads)
 {
-    int code = b->sets[kind].failure[0] ? CODE_DONE : time_rounds(b, &b->sets[kind], threads, found);
+    return options->calls ? options->calls : threads == 1 ? CALLS_SINGLE : CALLS_BATCH;
+}
+
+static int measure_threads(scene_bench *b, ray_kind kind, int threads, const measures *found)
+{
+    const unsigned calls = calls_for(b->options, threads);
+    int code = b->sets[kind].failure[0] ? CODE_DONE : time_rounds(b, &b->sets[kind], threads, calls, found);
     size_t first = b->results->row_count;
-    for (int m = 0; m < b->options->method_count && code == CODE_DONE; m++)
-        code = add_row(b, m, kind, threads, found, &outcomes[m]);
+    for (int k = 0; k < CALL_KINDS; k++)
+        for (int m = 0; m < b->options->method_count && code == CODE_DONE; m++)
+            if (calls & call_kinds[k]) code = add_row(b, m, kind, threads, k, found);
     progress_clear(&b->session->progress);
     if (code == CODE_DONE)
         bench_table_rows(bench_table_stream(b->options), b->results->rows + first,
@@ -325,23 +275,30 @@ static int measure_threads(scene_bench *b, ray_kind kind, int threads, const out
     return code;
 }
 
-/* Traces the set once with every method: disagreement and steps, which also warms up. */
-static int find_outcomes(scene_bench *b, ray_kind kind, outcome *outcomes)
+/* Keeps b->steps of a method for the heat maps. */
+static int keep_steps(scene_bench *b, const ray_set *set, uint32_t **kept)
+{
+    if (!*kept) *kept = malloc(set->count * sizeof **kept);
+    if (!*kept) return fail_memory(b->session);
+    memcpy(*kept, b->steps, set->count * sizeof **kept);
+    return CODE_DONE;
+}
+
+/* Traces the set once with every method and kind of calls: disagreement and steps, which also warms up. */
+static int find_outcomes(scene_bench *b, ray_kind kind, const measures *found)
 {
     const ray_set *set = &b->sets[kind];
     int methods = b->options->method_count;
+    const unsigned calls =
+        calls_for(b->options, 1) | (b->threads > 1 ? calls_for(b->options, b->threads) : 0);
     bool picture = b->options->heat_map && kind == RAYS_PRIMARY;
     uint32_t **steps = calloc((size_t)methods, sizeof *steps);
     int code = steps ? trace_references(b, set) : fail_memory(b->session);
-    for (int m = 0; m < methods && code == CODE_DONE; m++) {
-        if (b->subjects[m].failure[0]) continue;
-        code = find_outcome(b, m, set, &outcomes[m]);
-        if (!picture || code != CODE_DONE) continue;
-        steps[m] = malloc(set->count * sizeof **steps);
-        if (steps[m])
-            memcpy(steps[m], b->steps, set->count * sizeof **steps);
-        else
-            code = fail_memory(b->session);
+    for (int turn = 0; turn < methods * CALL_KINDS && code == CODE_DONE; turn++) {
+        int m = turn / CALL_KINDS, k = turn % CALL_KINDS;
+        if (b->subjects[m].failure[0] || !(calls & call_kinds[k])) continue;
+        code = find_outcome(b, m, set, call_kinds[k], &found->outcomes[k][m]);
+        if (picture && code == CODE_DONE) code = keep_steps(b, set, &steps[m]);
     }
     if (picture && code == CODE_DONE)
         code = heat_maps_save(b->session, b->options, b->path, set, steps, b->results);
@@ -350,20 +307,37 @@ static int find_outcomes(scene_bench *b, ray_kind kind, outcome *outcomes)
     return code;
 }
 
+static bool measures_make(measures *found, size_t methods, size_t rounds)
+{
+    bool good = true;
+    *found = (measures){0};
+    for (int k = 0; k < CALL_KINDS; k++) {
+        found->outcomes[k] = calloc(methods, sizeof *found->outcomes[k]);
+        found->wall[k] = calloc(methods * rounds, sizeof(double));
+        found->processor[k] = calloc(methods * rounds, sizeof(double));
+        good = good && found->outcomes[k] && found->wall[k] && found->processor[k];
+    }
+    return good;
+}
+
+static void measures_free(measures *found)
+{
+    for (int k = 0; k < CALL_KINDS; k++) {
+        free(found->outcomes[k]);
+        free(found->wall[k]);
+        free(found->processor[k]);
+    }
+}
+
 static int measure_set(scene_bench *b, ray_kind kind)
 {
-    size_t methods = (size_t)b->options->method_count;
-    outcome *outcomes = calloc(methods, sizeof *outcomes);
-    size_t all = methods * (size_t)b->options->rounds;
-    speeds found = {calloc(all, sizeof(double)), calloc(all, sizeof(double))};
-    int code = outcomes && found.wall && found.processor ? CODE_DONE : fail_memory(b->session);
-    if (code == CODE_DONE && !b->sets[kind].failure[0]) code = find_outcomes(b, kind, outcomes);
-    if (code == CODE_DONE) code = measure_threads(b, kind, 1, outcomes, &found);
-    int threads = (int)knurl_context_threads(b->references[0].subject.context);
-    if (code == CODE_DONE && threads > 1) code = measure_threads(b, kind, threads, outcomes, &found);
-    free(outcomes);
-    free(found.wall);
-    free(found.processor);
+    measures found;
+    bool good = measures_make(&found, (size_t)b->options->method_count, (size_t)b->options->rounds);
+    int code = good ? CODE_DONE : fail_memory(b->session);
+    if (code == CODE_DONE && !b->sets[kind].failure[0]) code = find_outcomes(b, kind, &found);
+    if (code == CODE_DONE) code = measure_threads(b, kind, 1, &found);
+    if (code == CODE_DONE && b->threads > 1) code = measure_threads(b, kind, b->threads, &found);
+    measures_free(&found);
     return code;
 }
 
@@ -381,9 +355,12 @@ static void print_subjects(const scene_bench *b)
 
 static int measure_all(scene_bench *b)
 {
-    int sets = b->options->kind_count * (knurl_context_threads(b->references[0].subject.context) > 1 ? 2 : 1);
-    b->runs = (size_t)sets * (size_t)b->options->rounds * (size_t)b->options->method_count;
     const subject *rays_from = &b->references[0].subject;
+    b->threads = (int)knurl_context_threads(rays_from->context);
+    const bool both = b->options->calls == (CALLS_SINGLE | CALLS_BATCH);
+    const size_t ways = (b->threads > 1 ? 2u : 1u) * (both ? 2u : 1u);
+    b->runs =
+        (size_t)b->options->kind_count * ways * (size_t)b->options->rounds * (size_t)b->options->method_count;
     double lower[3], upper[3], sum = 0;
     knurl_scene_bounds(rays_from->scene, lower, upper);
     for (int i = 0; i < 3; i++) sum += (upper[i] - lower[i]) * (upper[i] - lower[i]);

@@ -15,6 +15,32 @@ static void scale_displacement(const bench_options *options, knurl_description *
     }
 }
 
+static bool is_displaced(const knurl_description *description, uint32_t mesh)
+{
+    const int32_t number = description->meshes[mesh].material;
+    if (number < 0 || (uint32_t)number >= description->material_count) return false;
+    const knurl_description_material *material = &description->materials[number];
+    return material->displacement.image >= 0 || material->displacement_offset != 0.0;
+}
+
+/* Undisplaced meshes keep their numbers, but have neither triangles nor instances. Instances are moved behind
+ * those that remain, for subject_close. */
+static void leave_displaced(knurl_description *description)
+{
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < description->instance_count; i++) {
+        const knurl_description_instance instance = description->instances[i];
+        if (instance.mesh < 0 || (uint32_t)instance.mesh >= description->mesh_count ||
+            !is_displaced(description, (uint32_t)instance.mesh))
+            continue;
+        description->instances[i] = description->instances[kept];
+        description->instances[kept++] = instance;
+    }
+    description->instance_count = kept;
+    for (uint32_t i = 0; i < description->mesh_count; i++)
+        if (!is_displaced(description, i)) description->meshes[i].triangle_count = 0;
+}
+
 static knurl_status load_description(const bench_options *options, const char *path, bool unnormalised,
                                      subject *made, knurl_error *error)
 {
@@ -22,6 +48,8 @@ static knurl_status load_description(const bench_options *options, const char *p
     if (status == KNURL_OK) status = displacement_override(made->description, &options->displacement, error);
     if (status != KNURL_OK) return status;
     scale_displacement(options, made->description);
+    made->instance_count = made->description->instance_count;
+    if (options->displaced_only) leave_displaced(made->description);
     if (!unnormalised) return KNURL_OK;
     knurl_displacement_override override = knurl_displacement_override_default();
     override.unnormalised = 1;
@@ -73,6 +101,7 @@ int subject_open(command_session *session, const bench_options *options, const c
 void subject_close(subject *made)
 {
     knurl_scene_release(made->scene);
+    if (made->instance_count) made->description->instance_count = made->instance_count;
     knurl_description_release(made->description);
     knurl_context_release(made->context);
     memset(made, 0, sizeof *made);

@@ -50,12 +50,12 @@ void bench_table_subject(FILE *out, const subject *s, const char *reference)
 void bench_table_rows(FILE *out, const bench_row *rows, size_t count, bool heading)
 {
     if (heading)
-        fprintf(out, "\n%-16s %3s %8s %8s %8s %8s %7s %7s %7s %7s %7s %8s %8s  %s\n", "rays", "thr",
-                "Mrays/s", "min", "max", "frame ms", "steps", "p99", "max", "missed", "false", "dt med",
-                "dt p99", "method");
+        fprintf(out, "\n%-16s %3s %-6s %8s %8s %8s %8s %7s %7s %7s %7s %7s %8s %8s  %s\n", "rays", "thr",
+                "calls", "Mrays/s", "min", "max", "frame ms", "steps", "p99", "max", "missed", "false",
+                "dt med", "dt p99", "method");
     for (size_t i = 0; i < count; i++) {
         const bench_row *row = &rows[i];
-        fprintf(out, "%-16s %3d", row->rays, row->threads);
+        fprintf(out, "%-16s %3d %-6s", row->rays, row->threads, row->calls ? row->calls : "");
         if (row->failure[0]) {
             bool built = row->has_memory; /* else the table of scenes has said why */
             fprintf(out, " %s: %s\n", row->method, built ? row->failure : "not built, see above");
@@ -79,18 +79,17 @@ void bench_table_rows(FILE *out, const bench_row *rows, size_t count, bool headi
 
 /* ---- bytes ---- */
 
-enum { STRUCTURES = 8 };
-static const char *const structure_names[STRUCTURES] = {"mesh",       "shells",     "bvh",      "map_samples",
-                                                        "map_levels", "map_minmax", "map_rmip", "total"};
+enum { STRUCTURES = 9 };
+static const char *const structure_names[STRUCTURES] = {
+    "mesh", "shells", "bvh", "map_samples", "map_levels", "map_minmax", "map_rmip", "map_blocks", "total"};
 
 static void list_bytes(const knurl_scene_memory *memory, uint64_t bytes[STRUCTURES])
 {
     const knurl_heightmap_bytes *map = &memory->map_parts;
     const uint64_t list[STRUCTURES] = {
-        memory->mesh, memory->shells,
-        memory->bvh,  map->samples,
-        map->levels,  map->minmax,
-        map->rmip,    memory->mesh + memory->shells + memory->bvh + memory->maps};
+        memory->mesh, memory->shells, memory->bvh,
+        map->samples, map->levels,    map->minmax,
+        map->rmip,    map->blocks,    memory->mesh + memory->shells + memory->bvh + memory->maps};
     memcpy(bytes, list, sizeof list);
 }
 
@@ -115,14 +114,15 @@ static json_t *json_whole(double value)
 static json_t *describe_row(const bench_row *row)
 {
     return json_pack(
-        "{s:o, s:s, s:s, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, "
+        "{s:o, s:s, s:s, s:i, s:s?, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, "
+        "s:o, "
         "s:o, "
         "s:o}",
         "scene", json_text(row->scene), "method", row->method, "rays", row->rays, "threads", row->threads,
-        "count", json_count(row->count), "mrays_min", json_number(row->mrays.lowest), "mrays_median",
-        json_number(row->mrays.median), "mrays_max", json_number(row->mrays.highest), "mrays_cpu_median",
-        json_number(row->mrays_cpu), "frame_ms_median", json_number(row->frame_ms), "steps_mean",
-        json_number(row->steps.mean), "steps_p99", json_whole(row->steps.p99), "steps_max",
+        "calls", row->calls, "count", json_count(row->count), "mrays_min", json_number(row->mrays.lowest),
+        "mrays_median", json_number(row->mrays.median), "mrays_max", json_number(row->mrays.highest),
+        "mrays_cpu_median", json_number(row->mrays_cpu), "frame_ms_median", json_number(row->frame_ms),
+        "steps_mean", json_number(row->steps.mean), "steps_p99", json_whole(row->steps.p99), "steps_max",
         json_whole(row->steps.highest), "build_ms", json_number(row->build_ms), "bytes", describe_bytes(row),
         "missed", json_whole(row->missed), "false", json_whole(row->invented), "dt_median",
         json_number(row->dt_median), "dt_p99", json_number(row->dt_p99), "reference",
@@ -191,7 +191,7 @@ static void write_row(FILE *file, const bench_row *row)
     write_text(file, row->scene);
     fputc(',', file);
     write_text(file, row->method);
-    fprintf(file, ",%s,%d,%zu", row->rays, row->threads, row->count);
+    fprintf(file, ",%s,%d,%s,%zu", row->rays, row->threads, row->calls ? row->calls : "", row->count);
     const double numbers[] = {row->mrays.lowest, row->mrays.median,  row->mrays.highest,
                               row->mrays_cpu,    row->frame_ms,      row->steps.mean,
                               row->steps.p99,    row->steps.highest, row->build_ms};
@@ -216,7 +216,8 @@ static int save_csv(command_session *session, const bench_options *options, cons
     output_file output;
     int code = output_open(session, &output, options->csv);
     if (code != CODE_DONE) return code;
-    fputs("scene,method,rays,threads,count,mrays_min,mrays_median,mrays_max,mrays_cpu_median,frame_ms_median,"
+    fputs("scene,method,rays,threads,calls,count,mrays_min,mrays_median,mrays_max,mrays_cpu_median,frame_ms_"
+          "median,"
           "steps_mean,"
           "steps_p99,steps_max,build_ms",
           output.file);

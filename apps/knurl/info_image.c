@@ -141,9 +141,10 @@ static json_t *describe_map(command_session *session, const info_options *option
     knurl_range range = knurl_heightmap_range(map);
     double tile_u = isnan(options->displacement.tile_u) ? 1 : options->displacement.tile_u;
     double tile_v = isnan(options->displacement.tile_v) ? 1 : options->displacement.tile_v;
-    json_t *sizes = json_pack("{s:o, s:o, s:o, s:o, s:o}", "samples", json_count(bytes.samples), "levels",
-                              json_count(bytes.levels), "minmax", json_count(bytes.minmax), "rmip",
-                              json_count(bytes.rmip), "total", json_count(use.map_bytes));
+    json_t *sizes = json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "samples", json_count(bytes.samples),
+                              "levels", json_count(bytes.levels), "minmax", json_count(bytes.minmax), "rmip",
+                              json_count(bytes.rmip), "blocks", json_count(bytes.blocks), "total",
+                              json_count(use.map_bytes));
     json_t *tiled = json_pack("{s:o, s:o, s:o, s:o, s:o}", "u", json_number(tile_u), "v", json_number(tile_v),
                               "texels", json_number(use.texels), "map_bytes", json_count(use.map_bytes),
                               "tessellated_bytes", json_count(use.tessellated_bytes));

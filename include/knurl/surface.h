@@ -84,7 +84,8 @@ typedef struct knurl_hit {
     uint32_t steps;     /* traversal steps: bounds visited plus texels visited, whole ray */
 } knurl_hit;
 
-/* A displaced mesh made ready for one method. Immutable; any number of threads may trace it. */
+/* A displaced mesh made ready for one method. Immutable but for knurl_surface_update(); any number of threads
+ * may trace it. */
 typedef struct knurl_surface knurl_surface;
 
 typedef struct knurl_surface_def {
@@ -101,7 +102,18 @@ KNURL_API knurl_status knurl_surface_create(knurl_context *context, const knurl_
 KNURL_API void knurl_surface_release(knurl_surface *surface);
 KNURL_API knurl_surface *knurl_surface_retain(knurl_surface *surface);
 
-/* Number of shells, one per base triangle; the primitive count for an outside BVH. */
+/* Brings the surface up to date after knurl_heightmap_update() replaced this rectangle of its map, or several
+ * edits inside it: shells, the method's data, the info; of methods with a hierarchy of their own, only what
+ * depends on the rectangle. Any wrap mode and tiling. Nothing else may use the surface, or a scene that has
+ * it, during the call; afterwards call knurl_scene_update() for each such scene. Hits are those of a new
+ * surface on the edited map. If it fails, rays may still be shot but can miss what changed, the edit counts
+ * as not yet taken in, and the next successful call takes in everything. KNURL_ERROR_ARGUMENT: not a
+ * rectangle of the map, or displacement beyond 1e18. KNURL_ERROR_MEMORY. */
+KNURL_API knurl_status knurl_surface_update(knurl_surface *surface, int32_t x, int32_t y, int32_t width,
+                                            int32_t height, knurl_error *error);
+
+/* Number of shells: the primitive count for an outside BVH. One per base triangle; one in all for methods
+ * with a hierarchy of their own (KNURL_METHOD_WHOLE). */
 KNURL_API uint32_t knurl_surface_shell_count(const knurl_surface *surface);
 /* Axis-aligned box of one shell, rounded outwards; false if the triangle is empty (skip it). */
 KNURL_API bool knurl_surface_shell_bounds(const knurl_surface *surface, uint32_t shell, float lower[3],
@@ -112,6 +124,13 @@ KNURL_API bool knurl_surface_intersect(const knurl_surface *surface, uint32_t sh
                                        knurl_hit *hit);
 /* Whether anything of one shell lies in [tmin, tmax]. */
 KNURL_API bool knurl_surface_occluded(const knurl_surface *surface, uint32_t shell, const knurl_ray *ray);
+/* The same for many rays at once, which methods with a hierarchy of their own make use of: found[i] says
+ * whether ray i hit, hits[i] (not read before, fully written where found) what. */
+KNURL_API void knurl_surface_intersect_many(const knurl_surface *surface, uint32_t shell,
+                                            const knurl_ray *rays, size_t count, knurl_hit *hits,
+                                            bool *found);
+KNURL_API void knurl_surface_occluded_many(const knurl_surface *surface, uint32_t shell,
+                                           const knurl_ray *rays, size_t count, bool *found);
 /* Resolves a cone to the level of detail of this surface (see knurl_ray), at distance t. */
 KNURL_API double knurl_surface_cone_lod(const knurl_surface *surface, const knurl_ray *ray, double t);
 
@@ -145,7 +164,8 @@ KNURL_API const char *knurl_method_summary(int32_t index); /* one line, with its
 enum {
     KNURL_METHOD_EXACT = 1u << 0,        /* finds the first hit of the exact surface */
     KNURL_METHOD_UNNORMALISED = 1u << 1, /* defined for S = P + h N, and makes its surface so */
-    KNURL_METHOD_NATIVE = 1u << 2        /* traced by Embree itself; no level of detail, no shells */
+    KNURL_METHOD_NATIVE = 1u << 2,       /* traced by Embree itself; no level of detail, no shells */
+    KNURL_METHOD_WHOLE = 1u << 3         /* has a hierarchy of its own: the surface is one shell */
 };
 KNURL_API uint32_t knurl_method_flags(int32_t index); /* KNURL_METHOD_*; 0 out of range */
 

@@ -238,6 +238,8 @@ def structure_bytes(row):
         used += parts["map_minmax"]
     elif method.startswith("rmip"):
         used += parts["map_rmip"]
+    elif method.startswith("fast"):
+        used += parts.get("map_blocks", 0)
     return used
 
 

@@ -4,14 +4,15 @@ import os
 import sys
 import time
 
+import fast
 import pdm
 import relief
 import rmip
 from common import LEVELS, Session, fail, reductions, today
 
-RESULTS = {**rmip.RESULTS, **pdm.RESULTS, **relief.RESULTS}
+RESULTS = {**rmip.RESULTS, **pdm.RESULTS, **relief.RESULTS, **fast.RESULTS}
 PAGES = ["rmip-table-1", "rmip-figure-9", "rmip-figure-10", "rmip-figure-11", "rmip-figure-12", "pdm-table-1",
-         "pdm-figure-7", "baboud-table-1", "baboud-figure-12", "kolb-tables"]
+         "pdm-figure-7", "baboud-table-1", "baboud-figure-12", "kolb-tables", "fast"]
 
 
 def parse():

@@ -172,6 +172,20 @@ static knurl_status build_scene(accel_bvh *bvh, uint32_t count, const char *what
     return status;
 }
 
+knurl_status accel_bvh_create_box(accel_device *device, const accel_box *box, const char *what,
+                                  accel_bvh **out, knurl_error *error)
+{
+    *out = NULL;
+    accel_bvh *bvh = knurl_alloc_zero(device->context, sizeof *bvh);
+    if (!bvh) return knurl_fail_memory(error, sizeof *bvh, what);
+    bvh->device = accel_device_retain(device);
+    bvh->box = *box;
+    bvh->empty = accel_box_is_empty(box);
+    if (!bvh->empty) set_frame(bvh);
+    *out = bvh;
+    return KNURL_OK;
+}
+
 knurl_status accel_bvh_create(accel_device *device, uint32_t count, accel_bounds_fn *bounds, const void *user,
                               const char *what, accel_bvh **out, knurl_error *error)
 {
@@ -183,7 +197,8 @@ knurl_status accel_bvh_create(accel_device *device, uint32_t count, accel_bounds
     bvh->user = user;
     bvh->box = accel_box_empty();
     knurl_status status = find_bounds(bvh, count, error);
-    if (status == KNURL_OK && !accel_box_is_empty(&bvh->box)) {
+    bvh->empty = accel_box_is_empty(&bvh->box);
+    if (status == KNURL_OK && !bvh->empty) {
         set_frame(bvh);
         status = build_scene(bvh, count, what, error);
     }
@@ -215,18 +230,27 @@ vec3 accel_bvh_centre(const accel_bvh *bvh)
 
 /* ---- Tracing ---------------------------------------------------------------------------------- */
 
-/* Narrows [*t0, *t1] to one slab |o + t d| <= half. */
-static bool clip_axis(double o, double d, double half, double *t0, double *t1)
+/* Narrows [*t0, *t1] to one slab |o + t d| <= half. Nothing here becomes NaN: o and half are finite, and the
+ * reciprocal of a finite number is not 0. */
+static inline bool clip_axis(double o, double d, double half, double *t0, double *t1)
 {
-    if (d == 0.0) return fabs(o) <= half;
     double inverse = 1.0 / d;
-    if (!isfinite(inverse)) { /* d is so small that any finite way stays on the spot */
-        return fabs(o) <= half;
-    }
+    /* d is 0, or so small that any finite way stays on the spot */
+    if (!(fabs(inverse) < INFINITY)) return fabs(o) <= half;
     double a = (-half - o) * inverse, b = (half - o) * inverse;
-    *t0 = fmax(*t0, fmin(a, b));
-    *t1 = fmin(*t1, fmax(a, b));
+    *t0 = max_d(min_d(a, b), *t0);
+    *t1 = min_d(max_d(a, b), *t1);
     return *t0 <= *t1;
+}
+
+/* `from` is the origin relative to the centre. */
+static inline bool clip_box(const accel_bvh *bvh, vec3 from, vec3 direction, double *t0, double *t1)
+{
+    /* Distances to the planes are rounded relative to how far away the ray starts. */
+    double slack = 0x1p-50 * v3_max_component(v3_abs(from));
+    return clip_axis(from.x, direction.x, bvh->half.x + slack, t0, t1) &&
+           clip_axis(from.y, direction.y, bvh->half.y + slack, t0, t1) &&
+           clip_axis(from.z, direction.z, bvh->half.z + slack, t0, t1) && *t1 < INFINITY;
 }
 
 /* o + t d for o = high + low, with one rounding of the sum that cancels. */
@@ -246,31 +270,52 @@ static void subtract_exactly(double a, double b, double *high, double *low)
 bool accel_bvh_clip(const accel_bvh *bvh, vec3 origin, vec3 direction, double tmin, double tmax,
                     accel_segment *segment)
 {
-    if (!bvh->scene) return false;
+    if (bvh->empty) return false;
     vec3 high, low;
     subtract_exactly(origin.x, bvh->centre.x, &high.x, &low.x);
     subtract_exactly(origin.y, bvh->centre.y, &high.y, &low.y);
     subtract_exactly(origin.z, bvh->centre.z, &high.z, &low.z);
-    /* Distances to the planes are rounded relative to how far away the ray starts. */
-    double slack = 0x1p-50 * v3_max_component(v3_abs(high));
     double t0 = tmin, t1 = tmax;
-    if (!clip_axis(high.x, direction.x, bvh->half.x + slack, &t0, &t1) ||
-        !clip_axis(high.y, direction.y, bvh->half.y + slack, &t0, &t1) ||
-        !clip_axis(high.z, direction.z, bvh->half.z + slack, &t0, &t1))
-        return false;
+    if (!clip_box(bvh, high, direction, &t0, &t1)) return false;
     segment->direction = direction;
     segment->t0 = t0;
     segment->t1 = t1;
     segment->origin = v3(advance(high.x, low.x, t0, direction.x), advance(high.y, low.y, t0, direction.y),
                          advance(high.z, low.z, t0, direction.z));
-    return isfinite(t0) && isfinite(t1) && v3_finite(segment->origin);
+    return v3_finite(segment->origin);
+}
+
+bool accel_bvh_clip_range(const accel_bvh *bvh, const double origin[3], const double direction[3],
+                          double tmin, double tmax, accel_segment *segment)
+{
+    if (bvh->empty) return false;
+    double t0 = tmin, t1 = tmax;
+    bool meets = clip_box(bvh, v3_sub(v3_load(origin), bvh->centre), v3_load(direction), &t0, &t1);
+    segment->t0 = t0;
+    segment->t1 = t1;
+    return meets;
+}
+
+/* The power of two that makes `longest` fall into [1/2, 1), as ldexp(1, -exponent by frexp). */
+static double shrink_of(double longest)
+{
+    uint64_t bits;
+    memcpy(&bits, &longest, sizeof bits);
+    uint64_t biased = bits >> 52; /* no sign */
+    if (biased >= 1 && biased <= 2044) {
+        bits = (2045 - biased) << 52;
+        double shrink;
+        memcpy(&shrink, &bits, sizeof shrink);
+        return shrink;
+    }
+    int exponent = 0;
+    (void)frexp(longest, &exponent);
+    return ldexp(1.0, -exponent);
 }
 
 bool accel_bvh_start_ray(const accel_bvh *bvh, const accel_segment *segment, struct RTCRay *ray, double *rate)
 {
-    int exponent = 0;
-    (void)frexp(v3_max_component(v3_abs(segment->direction)), &exponent);
-    double shrink = ldexp(1.0, -exponent);
+    double shrink = shrink_of(v3_max_component(v3_abs(segment->direction)));
     vec3 d = v3_scale(segment->direction, shrink), o = v3_scale(segment->origin, bvh->scale);
     *rate = bvh->scale / shrink;
     /* Embree asks for coordinates under 1.8e18. A ray that starts so far away that its distance to the object
@@ -287,7 +332,7 @@ bool accel_bvh_start_ray(const accel_bvh *bvh, const accel_segment *segment, str
 void accel_bvh_traverse(const accel_bvh *bvh, const accel_segment *segment, double tmax, bool any,
                         accel_visit_fn *visit, void *user)
 {
-    query q = {.visit = visit, .user = user, .tmax = fmin(tmax, segment->t1), .t0 = segment->t0};
+    query q = {.visit = visit, .user = user, .tmax = min_d(tmax, segment->t1), .t0 = segment->t0};
     struct RTCRayHit ray;
     if (!(q.tmax >= q.t0) || !accel_bvh_start_ray(bvh, segment, &ray.ray, &q.rate)) return;
     memset(&ray.hit, 0, sizeof ray.hit);

@@ -32,6 +32,12 @@ static inline accel_box accel_box_union(const accel_box *a, const accel_box *b)
     return (accel_box){v3_min(a->lower, b->lower), v3_max(a->upper, b->upper)};
 }
 
+static inline bool accel_box_equal(const accel_box *a, const accel_box *b)
+{
+    return a->lower.x == b->lower.x && a->lower.y == b->lower.y && a->lower.z == b->lower.z &&
+           a->upper.x == b->upper.x && a->upper.y == b->upper.y && a->upper.z == b->upper.z;
+}
+
 /* Box of a primitive; false to leave it out. Called from several threads at once. */
 typedef bool accel_bounds_fn(const void *user, uint32_t primitive, accel_box *box);
 
@@ -42,6 +48,10 @@ knurl_status accel_bvh_create(accel_device *device, uint32_t count, accel_bounds
 void accel_bvh_release(accel_bvh *bvh);
 /* Union of the primitives' boxes. */
 accel_box accel_bvh_bounds(const accel_bvh *bvh);
+/* One primitive, for which no hierarchy is needed: rays can be clipped to its box (accel_bvh_clip_range),
+ * but accel_bvh_traverse does not work. */
+knurl_status accel_bvh_create_box(accel_device *device, const accel_box *box, const char *what,
+                                  accel_bvh **bvh, knurl_error *error);
 /* The point that accel_segment.origin is relative to; its coordinates are floats. */
 vec3 accel_bvh_centre(const accel_bvh *bvh);
 
@@ -56,6 +66,10 @@ typedef struct accel_segment {
 /* False if the ray does not come near the primitives, or is not finite. */
 bool accel_bvh_clip(const accel_bvh *bvh, vec3 origin, vec3 direction, double tmin, double tmax,
                     accel_segment *segment);
+
+/* The same, but finds t0 and t1 only. */
+bool accel_bvh_clip_range(const accel_bvh *bvh, const double origin[3], const double direction[3],
+                          double tmin, double tmax, accel_segment *segment);
 
 /* Called for each primitive whose box the segment meets before `tmax`, more or less front to back.
  * Returns the new tmax, not above the old one: the hit found, or -INFINITY to end the traversal. */

@@ -47,6 +47,10 @@ knurl_status accel_device_create(knurl_context *context, accel_device **out, knu
                           code == RTC_ERROR_OUT_OF_MEMORY ? KNURL_ERROR_MEMORY : KNURL_ERROR_UNSUPPORTED,
                           "Embree cannot start: error %d, expected a CPU with SSE2 at least", (int)code);
     }
+    device->lanes = rtcGetDeviceProperty(device->device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)  ? 16
+                    : rtcGetDeviceProperty(device->device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8
+                    : rtcGetDeviceProperty(device->device, RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED) ? 4
+                                                                                                      : 0;
     rtcSetDeviceErrorFunction(device->device, on_error, device);
     rtcSetDeviceMemoryMonitorFunction(device->device, on_memory, device);
     *out = device;

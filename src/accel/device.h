@@ -12,6 +12,7 @@ struct accel_device {
     knurl_context *context;
     atomic_size_t references;
     RTCDevice device;
+    size_t lanes; /* of its widest packets: 16, 8, 4, or 0 if it has none */
     atomic_llong bytes;
     pthread_mutex_t lock; /* guards the two below: Embree reports from its build threads */
     enum RTCError failure;
@@ -20,10 +21,11 @@ struct accel_device {
 
 struct accel_bvh {
     accel_device *device;
-    RTCScene scene;          /* NULL if there is nothing in it */
+    RTCScene scene;          /* NULL if there is nothing in it, or one box only */
     accel_bounds_fn *bounds; /* NULL: Embree's own geometry (native.c) */
     const void *user;
     accel_box box;
+    bool empty;        /* the box is */
     vec3 centre, half; /* of the bounds; half is padded */
     double scale;      /* Embree sees (x - centre) * scale: see bvh.c */
 };

@@ -14,4 +14,10 @@ knurl_status accel_native_create(accel_device *device, const native_mesh *mesh, 
 bool accel_native_intersect(const accel_bvh *bvh, const accel_segment *segment, double tmax, native_hit *hit);
 bool accel_native_occluded(const accel_bvh *bvh, const accel_segment *segment, double tmax);
 
+/* The same for many rays, each up to its tmax, in packets where that pays. */
+void accel_native_intersect_many(const accel_bvh *bvh, const knurl_ray *rays, const accel_segment *segments,
+                                 size_t count, native_hit *hits, bool *found);
+void accel_native_occluded_many(const accel_bvh *bvh, const knurl_ray *rays, const accel_segment *segments,
+                                size_t count, bool *found);
+
 #endif

@@ -1,13 +1,17 @@
 /* Ranges of cells. One pass over the samples folds the rows of a row of cells column by column, then
- * the columns of each cell; larger cells come from smaller ones. */
+ * the columns of each cell; larger cells come from smaller ones. Any rectangle of cells can be made alone,
+ * and each cell depends on its own samples only, so an edit leaves what a new map would have. */
 #include "bounds/cells.h"
 
 #include "bounds/columns.h"
 
 #include <math.h>
-#include <string.h>
 
-enum { CELLS_TEXELS = 65536, CELLS_CODES = 65536 }; /* sizes of pieces of parallel work */
+enum {
+    CELLS_TEXELS = 1 << 18, /* sizes of pieces of parallel work */
+    CELLS_CODES = 1 << 16,
+    CELLS_STRIP = 1024 /* columns that are folded at once, a multiple of all cell sizes */
+};
 
 static size_t grain_of(size_t unit, size_t per_row)
 {
@@ -15,107 +19,40 @@ static size_t grain_of(size_t unit, size_t per_row)
     return grain ? grain : 1;
 }
 
-typedef struct cells_job {
-    const height_level *level;
-    const columns_kernels *kernels;
-    cell_grid grid;
-    float *ranges; /* float maps: (minimum, maximum) of each cell, before there is a scale */
-    unsigned char *scratch;
-    size_t scratch_bytes; /* per thread: two rows of columns */
-    const cell_scale *scale;
-} cells_job;
-
-/* The rows of samples that a row of cells holds. */
-static int32_t cell_rows(const cells_job *job, size_t cell, const void **rows)
+/* Cells of an axis that hold any of samples [first, end), as up to two intervals. */
+static int32_t axis_holders(int32_t size, int32_t shift, int32_t first, int32_t end, int32_t begins[2],
+                            int32_t ends[2])
 {
-    const height_level *level = job->level;
-    size_t row_bytes = (size_t)level->width * (size_t)level->format;
-    int64_t first = (int64_t)cell << job->grid.shift, last = first + (1 << job->grid.shift);
-    int32_t count = 0;
-    for (int64_t y = first; y <= last && y <= level->height; y++)
-        rows[count++] =
-            (const unsigned char *)level->samples + (size_t)(y < level->height ? y : 0) * row_bytes;
+    int32_t count = cell_count(size, shift);
+    begins[0] = (first > 0 ? first - 1 : 0) >> shift;
+    ends[0] = ((end - 1) >> shift) + 1;
+    if (first > 0 || ends[0] == count) return 1;
+    begins[1] = count - 1; /* whose far end is sample 0 */
+    ends[1] = count;
+    return 2;
+}
+
+int32_t cell_holders(const height_level *level, int32_t shift, height_rect samples, height_rect cells[4])
+{
+    int32_t x0[2], x1[2], y0[2], y1[2], count = 0;
+    int32_t columns = axis_holders(level->width, shift, samples.x0, samples.x1, x0, x1);
+    int32_t rows = axis_holders(level->height, shift, samples.y0, samples.y1, y0, y1);
+    for (int32_t j = 0; j < rows; j++)
+        for (int32_t i = 0; i < columns; i++) cells[count++] = (height_rect){x0[i], y0[j], x1[i], y1[j]};
     return count;
 }
 
-static void spans_float(const float *min, const float *max, int32_t width, int32_t shift, float *ranges)
-{
-    for (int32_t x = 0; x < width; x += 1 << shift) {
-        int32_t last = x + (1 << shift) < width ? x + (1 << shift) : width;
-        float low = min[x], high = max[x];
-        for (int32_t i = x + 1; i <= last; i++) {
-            low = min[i] < low ? min[i] : low;
-            high = max[i] > high ? max[i] : high;
-        }
-        ranges[2 * (x >> shift)] = low;
-        ranges[2 * (x >> shift) + 1] = high;
-    }
-}
-
-static void fold_float_row(const cells_job *job, size_t cell, unsigned char *scratch)
-{
-    const void *rows[COLUMNS_MAX_ROWS];
-    int32_t count = cell_rows(job, cell, rows), width = job->level->width;
-    float *min = (float *)(void *)scratch, *max = (float *)(void *)(scratch + job->scratch_bytes / 2);
-    const float *typed[COLUMNS_MAX_ROWS];
-    for (int32_t i = 0; i < count; i++) typed[i] = rows[i];
-    job->kernels->f32(typed, count, width, min, max);
-    min[width] = min[0];
-    max[width] = max[0];
-    spans_float(min, max, width, job->grid.shift, job->ranges + 2 * cell * (size_t)job->grid.width);
-}
-
-static void fold_integer_row(const cells_job *job, size_t cell, unsigned char *scratch)
-{
-    const void *rows[COLUMNS_MAX_ROWS];
-    int32_t count = cell_rows(job, cell, rows), width = job->level->width;
-    uint16_t *min = (uint16_t *)(void *)scratch;
-    uint16_t *not_max = (uint16_t *)(void *)(scratch + job->scratch_bytes / 2);
-    if (job->level->format == KNURL_PIXEL_U8) {
-        const uint8_t *typed[COLUMNS_MAX_ROWS];
-        for (int32_t i = 0; i < count; i++) typed[i] = rows[i];
-        job->kernels->u8(typed, count, width, min, not_max);
-    } else {
-        const uint16_t *typed[COLUMNS_MAX_ROWS];
-        for (int32_t i = 0; i < count; i++) typed[i] = rows[i];
-        job->kernels->u16(typed, count, width, min, not_max);
-    }
-    min[width] = min[0];
-    not_max[width] = not_max[0];
-    job->kernels->spans(min, not_max, width, job->grid.shift,
-                        job->grid.codes + cell * (size_t)job->grid.width);
-}
-
-static void fold_rows(void *user, size_t begin, size_t end, int32_t thread)
-{
-    const cells_job *job = user;
-    unsigned char *scratch = job->scratch + (size_t)thread * job->scratch_bytes;
-    for (size_t cell = begin; cell < end; cell++) {
-        if (job->level->format == KNURL_PIXEL_F32)
-            fold_float_row(job, cell, scratch);
-        else
-            fold_integer_row(job, cell, scratch);
-    }
-}
-
-/* Float maps */
+/* The scale of float maps */
 
 static double decode(const cell_scale *scale, int32_t code)
 {
     return scale->range_min + (double)code * scale->step;
 }
 
-static cell_scale float_scale(const float *ranges, size_t count)
+cell_scale cell_scale_make(double range_min, double range_max)
 {
-    float low = ranges[0], high = ranges[1];
-    for (size_t i = 1; i < count; i++) {
-        low = ranges[2 * i] < low ? ranges[2 * i] : low;
-        high = ranges[2 * i + 1] > high ? ranges[2 * i + 1] : high;
-    }
-    /* + 0.0: a negative zero would make the scale depend on the order of comparisons. */
-    cell_scale scale = {(double)low + 0.0, (double)high + 0.0, 0.0};
-    scale.step = (scale.range_max - scale.range_min) / 65535.0;
-    while (decode(&scale, 65535) < scale.range_max) scale.step = nextafter(scale.step, INFINITY);
+    cell_scale scale = {range_min, range_max, (range_max - range_min) / 65535.0};
+    while (decode(&scale, 65535) < range_max) scale.step = nextafter(scale.step, INFINITY);
     return scale;
 }
 
@@ -134,62 +71,122 @@ static uint32_t encode(const cell_scale *scale, double value, bool up)
     return (uint32_t)code;
 }
 
-static void encode_rows(void *user, size_t begin, size_t end, int32_t thread)
+/* From samples to cells */
+
+typedef struct fold_job {
+    const height_level *level;
+    const cell_scale *scale;
+    const cell_grid *grid;
+    const columns_kernels *kernels;
+    height_rect cells;
+} fold_job;
+
+/* Samples [first, end) of the rows of a row of cells. Where `end` is the map's, what follows is sample 0
+ * of the next period; elsewhere it is the next sample. */
+typedef struct strip {
+    const void *rows[COLUMNS_MAX_ROWS];
+    int32_t row_count, first, end;
+} strip;
+
+static void strip_rows(const fold_job *job, int32_t cell_row, strip *s)
+{
+    const height_level *level = job->level;
+    size_t row_bytes = (size_t)level->width * (size_t)level->format;
+    int64_t first = (int64_t)cell_row << job->grid->shift, last = first + (1 << job->grid->shift);
+    s->row_count = 0;
+    for (int64_t y = first; y <= last && y <= level->height; y++)
+        s->rows[s->row_count++] =
+            (const unsigned char *)level->samples + (size_t)(y < level->height ? y : 0) * row_bytes;
+}
+
+static void fold_columns_integer(const fold_job *job, const strip *s, int32_t x, int32_t count, uint16_t *min,
+                                 uint16_t *not_max)
+{
+    if (job->level->format == KNURL_PIXEL_U8) {
+        const uint8_t *rows[COLUMNS_MAX_ROWS];
+        for (int32_t i = 0; i < s->row_count; i++) rows[i] = (const uint8_t *)s->rows[i] + x;
+        job->kernels->u8(rows, s->row_count, count, min, not_max);
+    } else {
+        const uint16_t *rows[COLUMNS_MAX_ROWS];
+        for (int32_t i = 0; i < s->row_count; i++) rows[i] = (const uint16_t *)s->rows[i] + x;
+        job->kernels->u16(rows, s->row_count, count, min, not_max);
+    }
+}
+
+static void fold_strip_integer(const fold_job *job, const strip *s, uint32_t *codes)
+{
+    uint16_t min[CELLS_STRIP + 1], not_max[CELLS_STRIP + 1];
+    int32_t count = s->end - s->first;
+    bool border = s->end == job->level->width;
+    fold_columns_integer(job, s, s->first, count + !border, min, not_max);
+    if (border) fold_columns_integer(job, s, 0, 1, min + count, not_max + count);
+    job->kernels->spans(min, not_max, count, job->grid->shift, codes);
+}
+
+static void fold_columns_float(const fold_job *job, const strip *s, int32_t x, int32_t count, float *min,
+                               float *max)
+{
+    const float *rows[COLUMNS_MAX_ROWS];
+    for (int32_t i = 0; i < s->row_count; i++) rows[i] = (const float *)s->rows[i] + x;
+    job->kernels->f32(rows, s->row_count, count, min, max);
+}
+
+static void fold_strip_float(const fold_job *job, const strip *s, uint32_t *codes)
+{
+    float min[CELLS_STRIP + 1], max[CELLS_STRIP + 1];
+    int32_t count = s->end - s->first, size = 1 << job->grid->shift;
+    bool border = s->end == job->level->width;
+    fold_columns_float(job, s, s->first, count + !border, min, max);
+    if (border) fold_columns_float(job, s, 0, 1, min + count, max + count);
+    for (int32_t x = 0; x < count; x += size) {
+        int32_t last = x + size < count ? x + size : count;
+        float low = min[x], high = max[x];
+        for (int32_t i = x + 1; i <= last; i++) {
+            low = min[i] < low ? min[i] : low;
+            high = max[i] > high ? max[i] : high;
+        }
+        codes[x >> job->grid->shift] =
+            code_make(encode(job->scale, (double)low, false), encode(job->scale, (double)high, true));
+    }
+}
+
+static void fold_rows(void *user, size_t begin, size_t end, int32_t thread)
 {
     (void)thread;
-    const cells_job *job = user;
-    size_t width = (size_t)job->grid.width;
-    for (size_t i = begin * width; i < end * width; i++)
-        job->grid.codes[i] = code_make(encode(job->scale, (double)job->ranges[2 * i], false),
-                                       encode(job->scale, (double)job->ranges[2 * i + 1], true));
-}
-
-static cell_scale integer_scale(const cell_grid *grid, knurl_pixel_format format)
-{
-    uint32_t all = 0;
-    for (size_t i = 0; i < (size_t)grid->width * (size_t)grid->height; i++)
-        all = code_union(all, grid->codes[i]);
-    double unit = format == KNURL_PIXEL_U8 ? 255.0 : 65535.0;
-    return (cell_scale){(double)code_min(all) / unit, (double)code_max(all) / unit, 0.0};
-}
-
-knurl_status cell_grid_build(knurl_context *context, const height_level *level, int32_t shift,
-                             cell_grid *grid, cell_scale *scale, knurl_error *error)
-{
-    *grid = (cell_grid){cell_count(level->width, shift), cell_count(level->height, shift), shift, NULL};
-    size_t cells = (size_t)grid->width * (size_t)grid->height;
-    bool is_float = level->format == KNURL_PIXEL_F32;
-    cells_job job = {.level = level,
-                     .kernels =
-                         knurl_cpu_features(context) & KNURL_CPU_AVX2 ? &columns_avx2 : &columns_plain};
-    job.scratch_bytes = 2 * ((((size_t)level->width + 1) * 4 + 63) / 64 * 64); /* whole cache lines */
-    grid->codes = knurl_alloc_array(context, cells, sizeof *grid->codes);
-    job.scratch = knurl_alloc_array(context, (size_t)knurl_context_threads(context), job.scratch_bytes);
-    if (is_float) job.ranges = knurl_alloc_array(context, cells, 2 * sizeof *job.ranges);
-    bool fits = grid->codes && job.scratch && (job.ranges || !is_float);
-    if (fits) {
-        job.grid = *grid;
-        job.scale = scale;
-        size_t grain = grain_of(CELLS_TEXELS, (size_t)level->width << shift);
-        knurl_parallel_for(context, (size_t)grid->height, grain, fold_rows, &job);
-        *scale = is_float ? float_scale(job.ranges, cells) : integer_scale(grid, level->format);
-        if (is_float)
-            knurl_parallel_for(context, (size_t)grid->height, grain_of(CELLS_CODES, (size_t)grid->width),
-                               encode_rows, &job);
-    } else {
-        knurl_free(context, grid->codes);
-        grid->codes = NULL;
+    const fold_job *job = user;
+    int32_t shift = job->grid->shift, cells = CELLS_STRIP >> shift, width = job->level->width;
+    for (size_t i = begin; i < end; i++) {
+        int32_t row = job->cells.y0 + (int32_t)i;
+        uint32_t *codes = job->grid->codes + (size_t)row * job->grid->stride;
+        strip s;
+        strip_rows(job, row, &s);
+        for (int32_t x = job->cells.x0; x < job->cells.x1; x += cells) {
+            int64_t last = (int64_t)(job->cells.x1 - x < cells ? job->cells.x1 : x + cells) << shift;
+            s.first = x << shift;
+            s.end = last < width ? (int32_t)last : width;
+            if (job->level->format == KNURL_PIXEL_F32)
+                fold_strip_float(job, &s, codes + x);
+            else
+                fold_strip_integer(job, &s, codes + x);
+        }
     }
-    knurl_free(context, job.scratch);
-    knurl_free(context, job.ranges);
-    return fits ? KNURL_OK
-                : knurl_fail_memory(error, cells * (is_float ? 12 : 4), "the cells of a height map");
+}
+
+void cell_grid_fold(knurl_context *context, const height_level *level, const cell_scale *scale,
+                    const cell_grid *grid, height_rect cells)
+{
+    bool avx2 = (knurl_cpu_features(context) & KNURL_CPU_AVX2) != 0;
+    fold_job job = {level, scale, grid, avx2 ? &columns_avx2 : &columns_plain, cells};
+    size_t per_row = (size_t)(cells.x1 - cells.x0) << (2 * grid->shift);
+    knurl_parallel_for(context, (size_t)(cells.y1 - cells.y0), grain_of(CELLS_TEXELS, per_row), fold_rows,
+                       &job);
 }
 
 /* Larger cells */
 
 typedef struct reduce_job {
     const cell_grid *fine, *coarse;
+    height_rect cells;
 } reduce_job;
 
 static void reduce_rows(void *user, size_t begin, size_t end, int32_t thread)
@@ -197,21 +194,24 @@ static void reduce_rows(void *user, size_t begin, size_t end, int32_t thread)
     (void)thread;
     const reduce_job *job = user;
     const cell_grid *fine = job->fine, *coarse = job->coarse;
-    size_t width = (size_t)fine->width;
-    for (size_t y = begin; y < end; y++) {
-        const uint32_t *a = fine->codes + 2 * y * width;
-        const uint32_t *b = 2 * y + 1 < (size_t)fine->height ? a + width : a;
-        uint32_t *to = coarse->codes + y * (size_t)coarse->width;
-        for (size_t x = 0; x < width / 2; x++)
+    size_t width = (size_t)fine->width, first = (size_t)job->cells.x0, last = (size_t)job->cells.x1;
+    size_t whole = last < width / 2 ? last : width / 2; /* the last of an odd width has one column */
+    for (size_t i = begin; i < end; i++) {
+        size_t y = (size_t)job->cells.y0 + i;
+        const uint32_t *a = fine->codes + 2 * y * fine->stride;
+        const uint32_t *b = 2 * y + 1 < (size_t)fine->height ? a + fine->stride : a;
+        uint32_t *to = coarse->codes + y * coarse->stride;
+        for (size_t x = first; x < whole; x++)
             to[x] = code_union(code_union(a[2 * x], a[2 * x + 1]), code_union(b[2 * x], b[2 * x + 1]));
-        if (width % 2) to[width / 2] = code_union(a[width - 1], b[width - 1]);
+        if (last > whole) to[whole] = code_union(a[width - 1], b[width - 1]);
     }
 }
 
-void cell_grid_reduce(knurl_context *context, const cell_grid *fine, cell_grid *coarse, uint32_t *codes)
+void cell_grid_reduce(knurl_context *context, const cell_grid *fine, const cell_grid *coarse,
+                      height_rect cells)
 {
-    *coarse = (cell_grid){(fine->width + 1) / 2, (fine->height + 1) / 2, fine->shift + 1, codes};
-    reduce_job job = {fine, coarse};
-    knurl_parallel_for(context, (size_t)coarse->height, grain_of(CELLS_CODES, (size_t)fine->width),
-                       reduce_rows, &job);
+    reduce_job job = {fine, coarse, cells};
+    size_t per_row = 4 * (size_t)(cells.x1 - cells.x0);
+    knurl_parallel_for(context, (size_t)(cells.y1 - cells.y0), grain_of(CELLS_CODES, per_row), reduce_rows,
+                       &job);
 }

@@ -1,11 +1,13 @@
 /* The height map object: an image's channel, its levels of detail, and range bounds over level 0. */
 #include "bounds/heightmap.h"
 
+#include "bounds/blocks.h"
 #include "bounds/minmax.h"
 #include "bounds/rmip.h"
 #include "data/levels.h"
 
 #include <math.h>
+#include <string.h>
 
 knurl_heightmap_def knurl_heightmap_def_default(void)
 {
@@ -63,68 +65,121 @@ static double axis_margin(const knurl_heightmap *map, int32_t level, bool vertic
     return level == 0 ? 0.0 : (reach * size0 - 0.5) * (1.0 + 0x1p-40);
 }
 
+static void set_float_range(knurl_heightmap *map, const double range[2])
+{
+    cell_scale scale = cell_scale_make(range[0], range[1]);
+    map->range_min = scale.range_min;
+    map->range_max = scale.range_max;
+    map->code_step = scale.step;
+}
+
 static knurl_status build_levels(knurl_heightmap *map, const knurl_heightmap_def *def, knurl_error *error)
 {
-    knurl_status status = height_level_copy(map->context, def->image, def->channel, &map->levels[0], error);
+    double range[2] = {0.0, 0.0};
+    knurl_status status =
+        height_level_copy(map->context, def->image, def->channel, &map->levels[0], range, error);
     if (status != KNURL_OK) return status;
+    if (map->levels[0].format == KNURL_PIXEL_F32) set_float_range(map, range);
     map->level_count = 1;
-    map->bytes.samples = height_level_bytes(&map->levels[0]);
     for (int32_t k = 0; k + 1 < HEIGHT_MAX_LEVELS; k++) {
         const height_level *fine = &map->levels[k];
         if ((fine->width == 1 && fine->height == 1) || k == def->max_level) break;
         status = height_level_filter(map->context, fine, &map->levels[k + 1], error);
         if (status != KNURL_OK) return status;
         map->level_count++;
-        map->bytes.levels += height_level_bytes(&map->levels[k + 1]);
         map->margin[k + 1][0] = axis_margin(map, k + 1, false);
         map->margin[k + 1][1] = axis_margin(map, k + 1, true);
     }
     return KNURL_OK;
 }
 
-/* Goes from cells of 1 << grid->shift texels to larger ones, in new memory. */
-static knurl_status coarsen(knurl_context *context, cell_grid *grid, int32_t shift, knurl_error *error)
+void heightmap_integer_range(knurl_heightmap *map)
 {
-    while (grid->shift < shift) {
-        size_t cells = (size_t)((grid->width + 1) / 2) * (size_t)((grid->height + 1) / 2);
-        uint32_t *codes = knurl_alloc_array(context, cells, sizeof *codes);
-        if (!codes) return knurl_fail_memory(error, cells * sizeof *codes, "the cells of a height map");
-        cell_grid coarse;
-        cell_grid_reduce(context, grid, &coarse, codes);
-        knurl_free(context, grid->codes);
-        *grid = coarse;
-    }
-    return KNURL_OK;
+    uint32_t all = map->minmax->codes[map->minmax->offset[map->minmax->level_count - 1]];
+    double unit = map->levels[0].format == KNURL_PIXEL_U8 ? 255.0 : 65535.0;
+    map->range_min = (double)code_min(all) / unit;
+    map->range_max = (double)code_max(all) / unit;
 }
 
-/* One pass over the samples makes cells of the smaller size, which both structures start from. */
+void heightmap_float_range(knurl_heightmap *map)
+{
+    double range[2];
+    height_level_range(map->context, &map->levels[0], range);
+    set_float_range(map, range);
+}
+
 static knurl_status build_bounds(knurl_heightmap *map, const knurl_heightmap_def *def, knurl_error *error)
 {
     double start = knurl_seconds();
-    int32_t rmip_shift = cell_shift(def->rmip_cell, 32), minmax_shift = cell_shift(def->minmax_cell, 16);
-    int32_t shift = rmip_shift < minmax_shift ? rmip_shift : minmax_shift;
-    cell_grid grid;
-    cell_scale scale;
-    knurl_status status = cell_grid_build(map->context, &map->levels[0], shift, &grid, &scale, error);
+    cell_scale scale = heightmap_scale(map);
+    knurl_status status = minmax_build(map->context, &map->levels[0], cell_shift(def->minmax_cell, 16),
+                                       &scale, &map->minmax, error);
     if (status != KNURL_OK) return status;
-    map->range_min = scale.range_min;
-    map->range_max = scale.range_max;
-    map->code_step = scale.step;
-    if (rmip_shift <= minmax_shift) {
-        status = rmip_build(map->context, &grid, &map->rmip, error);
-        if (status == KNURL_OK) status = coarsen(map->context, &grid, minmax_shift, error);
-        if (status == KNURL_OK) status = minmax_build(map->context, &grid, &map->minmax, error);
-    } else {
-        status = minmax_build(map->context, &grid, &map->minmax, error);
-        if (status == KNURL_OK) status = coarsen(map->context, &grid, rmip_shift, error);
-        if (status == KNURL_OK) status = rmip_build(map->context, &grid, &map->rmip, error);
-    }
-    knurl_free(map->context, grid.codes);
-    if (status != KNURL_OK) return status;
-    map->bytes.minmax = map->minmax->bytes;
-    map->bytes.rmip = map->rmip->bytes;
-    map->build_ms = 1e3 * (knurl_seconds() - start);
+    if (map->levels[0].format != KNURL_PIXEL_F32) heightmap_integer_range(map);
+    map->rmip_shift = cell_shift(def->rmip_cell, 32);
+    atomic_store(&map->build_ms, 1e3 * (knurl_seconds() - start));
     return KNURL_OK;
+}
+
+/* Structures on demand */
+
+/* Cells that the pyramid has are its cells; smaller ones need the samples. A pyramid that ends early ends
+ * with a single cell, which is what any larger cells come to. */
+void heightmap_fill_rmip(const knurl_heightmap *map, struct rmip_table *table, height_rect samples)
+{
+    const minmax_pyramid *pyramid = map->minmax;
+    cell_grid to = rmip_cells(table);
+    if (map->rmip_shift >= pyramid->shift) {
+        int32_t level = map->rmip_shift - pyramid->shift, last = pyramid->level_count - 1;
+        cell_grid from = minmax_level(pyramid, level < last ? level : last);
+        for (size_t y = 0; y < (size_t)to.height; y++)
+            memcpy(to.codes + y * to.stride, from.codes + y * from.stride,
+                   (size_t)to.width * sizeof *to.codes);
+    } else {
+        height_rect cells[4];
+        cell_scale scale = heightmap_scale(map);
+        int32_t count = cell_holders(&map->levels[0], to.shift, samples, cells);
+        for (int32_t i = 0; i < count; i++)
+            cell_grid_fold(map->context, &map->levels[0], &scale, &to, cells[i]);
+    }
+    rmip_fill(map->context, table);
+}
+
+static knurl_status make_rmip(knurl_heightmap *map, knurl_error *error)
+{
+    const height_level *level = &map->levels[0];
+    struct rmip_table *table = NULL;
+    knurl_status status =
+        rmip_create(map->context, cell_count(level->width, map->rmip_shift),
+                    cell_count(level->height, map->rmip_shift), map->rmip_shift, &table, error);
+    if (status != KNURL_OK) return status;
+    heightmap_fill_rmip(map, table, (height_rect){0, 0, level->width, level->height});
+    atomic_store_explicit(&map->rmip, table, memory_order_release);
+    return KNURL_OK;
+}
+
+static knurl_status make_blocks(knurl_heightmap *map, knurl_error *error)
+{
+    height_blocks *blocks = NULL;
+    knurl_status status =
+        height_blocks_build(map->context, &map->levels[0], map->range_min, map->range_max, &blocks, error);
+    if (status == KNURL_OK) atomic_store_explicit(&map->blocks, blocks, memory_order_release);
+    return status;
+}
+
+knurl_status heightmap_need(knurl_heightmap *map, uint32_t what, knurl_error *error)
+{
+    knurl_status status = KNURL_OK;
+    pthread_mutex_lock(&map->making);
+    double start = knurl_seconds();
+    bool rmip = (what & HEIGHT_NEED_RMIP) && !heightmap_rmip(map);
+    bool blocks = (what & HEIGHT_NEED_BLOCKS) && !heightmap_blocks(map);
+    if (rmip) status = make_rmip(map, error);
+    if (blocks && status == KNURL_OK) status = make_blocks(map, error);
+    if (rmip || blocks)
+        atomic_store(&map->build_ms, atomic_load(&map->build_ms) + 1e3 * (knurl_seconds() - start));
+    pthread_mutex_unlock(&map->making);
+    return status;
 }
 
 knurl_status knurl_heightmap_create(knurl_context *context, const knurl_heightmap_def *def,
@@ -139,6 +194,7 @@ knurl_status knurl_heightmap_create(knurl_context *context, const knurl_heightma
     if (!made) return knurl_fail_memory(error, sizeof *made, "a height map");
     made->context = knurl_context_retain(context);
     atomic_init(&made->references, 1);
+    pthread_mutex_init(&made->making, NULL);
     status = build_levels(made, def, error);
     if (status == KNURL_OK) status = build_bounds(made, def, error);
     if (status != KNURL_OK) {
@@ -159,9 +215,11 @@ void knurl_heightmap_release(knurl_heightmap *map)
 {
     if (!map || atomic_fetch_sub_explicit(&map->references, 1, memory_order_acq_rel) != 1) return;
     knurl_context *context = map->context;
+    height_blocks_destroy(context, map->blocks);
     rmip_destroy(context, map->rmip);
     minmax_destroy(context, map->minmax);
     for (int32_t k = 0; k < HEIGHT_MAX_LEVELS; k++) height_level_destroy(context, &map->levels[k]);
+    pthread_mutex_destroy(&map->making);
     knurl_free(context, map);
     knurl_context_release(context);
 }
@@ -181,6 +239,11 @@ int32_t knurl_heightmap_levels(const knurl_heightmap *map)
     return map->level_count;
 }
 
+knurl_pixel_format knurl_heightmap_format(const knurl_heightmap *map)
+{
+    return map->levels[0].format;
+}
+
 double knurl_heightmap_sample(const knurl_heightmap *map, int32_t level, int32_t x, int32_t y)
 {
     return height_fetch(&map->levels[level], x, y);
@@ -193,12 +256,19 @@ knurl_range knurl_heightmap_range(const knurl_heightmap *map)
 
 knurl_heightmap_bytes knurl_heightmap_memory(const knurl_heightmap *map)
 {
-    return map->bytes;
+    const struct rmip_table *rmip = heightmap_rmip(map);
+    const height_blocks *blocks = heightmap_blocks(map);
+    knurl_heightmap_bytes bytes = {.minmax = map->minmax->bytes};
+    for (int32_t k = 0; k < map->level_count; k++)
+        *(k == 0 ? &bytes.samples : &bytes.levels) += height_level_bytes(&map->levels[k]);
+    if (rmip) bytes.rmip = rmip->bytes;
+    if (blocks) bytes.blocks = blocks->bytes;
+    return bytes;
 }
 
 double knurl_heightmap_build_ms(const knurl_heightmap *map)
 {
-    return map->build_ms;
+    return atomic_load(&map->build_ms);
 }
 
 /* The value */

@@ -16,9 +16,20 @@ typedef struct minmax_pyramid {
     size_t bytes; /* all that the pyramid holds */
 } minmax_pyramid;
 
-knurl_status minmax_build(knurl_context *context, const cell_grid *cells, minmax_pyramid **pyramid,
-                          knurl_error *error);
+/* From cells of 1 << shift samples, shift at most 5. */
+knurl_status minmax_build(knurl_context *context, const height_level *level, int32_t shift,
+                          const cell_scale *scale, minmax_pyramid **pyramid, knurl_error *error);
+/* Brings up to date what depends on a rectangle of samples. */
+void minmax_update(knurl_context *context, minmax_pyramid *pyramid, const height_level *level,
+                   const cell_scale *scale, height_rect samples);
 void minmax_destroy(knurl_context *context, minmax_pyramid *pyramid);
+
+/* The cells of one level. */
+static inline cell_grid minmax_level(const minmax_pyramid *pyramid, int32_t level)
+{
+    return (cell_grid){pyramid->width[level], pyramid->height[level], pyramid->shift + level,
+                       (size_t)pyramid->width[level], pyramid->codes + pyramid->offset[level]};
+}
 
 /* Adds to the running union the bound of texel cells [x0, x1] x [y0, y1]: the finest level at which
  * they touch at most 2 x 2 nodes (Greene et al. 1993, as RMIP's section 6 describes it). */

@@ -136,8 +136,14 @@ static inline knurl_range decode(const knurl_heightmap *map, uint32_t high, uint
     return (knurl_range){map->range_min + min * map->code_step, max < map->range_max ? max : map->range_max};
 }
 
+/* NULL: the pyramid. */
+static inline const rmip_table *table_of(const knurl_heightmap *map, knurl_bounds_kind kind)
+{
+    return kind == KNURL_BOUNDS_RMIP ? heightmap_rmip(map) : NULL;
+}
+
 /* A rectangle anywhere. */
-static knurl_range wrapped_bounds(const knurl_heightmap *map, knurl_bounds_kind kind, const double x[2],
+static knurl_range wrapped_bounds(const knurl_heightmap *map, const rmip_table *table, const double x[2],
                                   const double y[2], knurl_wrap wrap_u, knurl_wrap wrap_v)
 {
     axis_cells h = {0}, v = {0};
@@ -146,8 +152,8 @@ static knurl_range wrapped_bounds(const knurl_heightmap *map, knurl_bounds_kind 
     uint32_t high = 0, low = 0;
     for (int32_t j = 0; j < v.count; j++) {
         for (int32_t i = 0; i < h.count; i++) {
-            if (kind == KNURL_BOUNDS_RMIP)
-                rmip_query(map->rmip, h.first[i], h.last[i], v.first[j], v.last[j], &high, &low);
+            if (table)
+                rmip_query(table, h.first[i], h.last[i], v.first[j], v.last[j], &high, &low);
             else
                 minmax_query(map->minmax, h.first[i], h.last[i], v.first[j], v.last[j], &high, &low);
         }
@@ -172,15 +178,16 @@ knurl_range heightmap_bounds_texels(const knurl_heightmap *map, knurl_bounds_kin
                                     double x1, double y1, knurl_wrap wrap_u, knurl_wrap wrap_v)
 {
     int32_t width = map->levels[0].width, height = map->levels[0].height;
+    const rmip_table *table = table_of(map, kind);
     if (wrap_u == KNURL_WRAP_REPEAT && !inside(x0, x1, width)) into_period(&x0, &x1, width);
     if (wrap_v == KNURL_WRAP_REPEAT && !inside(y0, y1, height)) into_period(&y0, &y1, height);
     if (!inside(x0, x1, width) || !inside(y0, y1, height))
-        return wrapped_bounds(map, kind, (const double[2]){x0, x1}, (const double[2]){y0, y1}, wrap_u,
+        return wrapped_bounds(map, table, (const double[2]){x0, x1}, (const double[2]){y0, y1}, wrap_u,
                               wrap_v);
     int32_t left = (int32_t)x0, right = last_cell(x1, left), top = (int32_t)y0, bottom = last_cell(y1, top);
     uint32_t high = 0, low = 0;
-    if (kind == KNURL_BOUNDS_RMIP)
-        rmip_query(map->rmip, left, right, top, bottom, &high, &low);
+    if (table)
+        rmip_query(table, left, right, top, bottom, &high, &low);
     else
         minmax_query(map->minmax, left, right, top, bottom, &high, &low);
     return decode(map, high, low);
@@ -230,6 +237,9 @@ knurl_range knurl_heightmap_bounds(const knurl_heightmap *map, knurl_bounds_kind
                                    double u1, double v1, knurl_wrap wrap_u, knurl_wrap wrap_v, double lod)
 {
     int32_t width = map->levels[0].width, height = map->levels[0].height;
+    /* The map is const in what it answers. Without memory for the table the pyramid answers. */
+    if (kind == KNURL_BOUNDS_RMIP && !heightmap_rmip(map))
+        heightmap_need((knurl_heightmap *)map, HEIGHT_NEED_RMIP, NULL);
     return heightmap_bounds_texels_lod(map, kind, to_texels(u0, width, -1.0), to_texels(v0, height, -1.0),
                                        to_texels(u1, width, 1.0), to_texels(v1, height, 1.0), wrap_u, wrap_v,
                                        lod);

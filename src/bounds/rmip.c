@@ -61,7 +61,6 @@ static inline bool axis_halves(const rmip_axis *axis, int32_t p, uint32_t i, siz
 typedef void union_rows_fn(uint32_t *to, const uint32_t *a, const uint32_t *b, size_t count);
 
 typedef struct rmip_job {
-    const cell_grid *cells;
     rmip_table *table;
     union_rows_fn *union_rows;
 } rmip_job;
@@ -74,8 +73,6 @@ static void widen_rows(void *user, size_t begin, size_t end, int32_t thread)
     const rmip_axis *x = &job->table->x;
     for (size_t y = begin; y < end; y++) {
         uint32_t *row = job->table->codes + y * job->table->stride;
-        const uint32_t *cells = job->cells->codes + y * (size_t)x->cells;
-        for (int32_t i = 0; i < x->cells; i++) row[i] = cells[i];
         for (int32_t p = 0; p + 1 < x->layers; p++) {
             uint32_t *to = row + x->base[p + 1], count = x->base[p + 2] - x->base[p + 1];
             for (uint32_t i = 0; i < count; i++) {
@@ -107,11 +104,10 @@ static void double_columns(void *user, size_t begin, size_t end, int32_t thread)
     }
 }
 
-knurl_status rmip_build(knurl_context *context, const cell_grid *cells, rmip_table **table,
-                        knurl_error *error)
+knurl_status rmip_create(knurl_context *context, int32_t width, int32_t height, int32_t shift,
+                         rmip_table **table, knurl_error *error)
 {
-    rmip_table made = {
-        .x = axis_layout(cells->width), .y = axis_layout(cells->height), .shift = cells->shift};
+    rmip_table made = {.x = axis_layout(width), .y = axis_layout(height), .shift = shift};
     size_t columns = made.x.base[made.x.layers], rows = made.y.base[made.y.layers];
     /* Lines of 16 entries; an odd number of them spreads rows over all cache sets. */
     size_t lines = (columns + 15) / 16;
@@ -127,12 +123,17 @@ knurl_status rmip_build(knurl_context *context, const cell_grid *cells, rmip_tab
     }
     made.bytes = sizeof made + rows * made.stride * sizeof *made.codes;
     **table = made;
-    bool avx2 = (knurl_cpu_features(context) & KNURL_CPU_AVX2) != 0;
-    rmip_job job = {cells, *table, avx2 ? code_union_rows_avx2 : code_union_rows};
-    size_t grain = RMIP_CODES / columns ? RMIP_CODES / columns : 1;
-    knurl_parallel_for(context, (size_t)made.y.cells, grain, widen_rows, &job);
-    knurl_parallel_for(context, columns, RMIP_STRIP, double_columns, &job);
     return KNURL_OK;
+}
+
+void rmip_fill(knurl_context *context, rmip_table *table)
+{
+    size_t columns = table->x.base[table->x.layers];
+    bool avx2 = (knurl_cpu_features(context) & KNURL_CPU_AVX2) != 0;
+    rmip_job job = {table, avx2 ? code_union_rows_avx2 : code_union_rows};
+    size_t grain = RMIP_CODES / columns ? RMIP_CODES / columns : 1;
+    knurl_parallel_for(context, (size_t)table->y.cells, grain, widen_rows, &job);
+    knurl_parallel_for(context, columns, RMIP_STRIP, double_columns, &job);
 }
 
 void rmip_destroy(knurl_context *context, rmip_table *table)

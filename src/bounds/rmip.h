@@ -20,9 +20,18 @@ typedef struct rmip_table {
     size_t bytes; /* all that the table holds */
 } rmip_table;
 
-knurl_status rmip_build(knurl_context *context, const cell_grid *cells, rmip_table **table,
-                        knurl_error *error);
+/* Room for the table of a grid of cells, whose ranges then go into rmip_cells(); rmip_fill() does the rest,
+ * and again after cells changed. */
+knurl_status rmip_create(knurl_context *context, int32_t width, int32_t height, int32_t shift,
+                         rmip_table **table, knurl_error *error);
+void rmip_fill(knurl_context *context, rmip_table *table);
 void rmip_destroy(knurl_context *context, rmip_table *table);
+
+/* Windows of one cell come first on both axes: they are the cells. */
+static inline cell_grid rmip_cells(const rmip_table *table)
+{
+    return (cell_grid){table->x.cells, table->y.cells, table->shift, table->stride, table->codes};
+}
 
 /* log2 of the distance between windows of 2^p cells. */
 static inline int32_t rmip_spacing(int32_t p)

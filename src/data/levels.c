@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { ROWS_TEXELS = 65536 }; /* texels per piece of parallel work */
+enum { ROWS_TEXELS = 1 << 17 }; /* texels per piece of parallel work */
 
 static size_t row_grain(int32_t width)
 {
@@ -29,6 +29,85 @@ void height_level_destroy(knurl_context *context, height_level *level)
     level->samples = NULL;
 }
 
+/* The range of float levels */
+
+typedef struct float_range {
+    _Atomic float low, high;
+} float_range;
+
+static void range_init(float_range *range)
+{
+    atomic_init(&range->low, INFINITY);
+    atomic_init(&range->high, -INFINITY);
+}
+
+static void range_result(float_range *range, double result[2])
+{
+    /* + 0.0: which of two zeros comes out depends on the order of comparisons. */
+    result[0] = (double)atomic_load(&range->low) + 0.0;
+    result[1] = (double)atomic_load(&range->high) + 0.0;
+}
+
+enum { LANES = 32 }; /* independent, so that they become vectors */
+
+typedef struct range_lanes {
+    float low[LANES], high[LANES];
+    float zero[LANES]; /* NaN once a value was not finite */
+} range_lanes;
+
+static inline void lanes_add(range_lanes *to, const float *values, size_t count)
+{
+    for (size_t k = 0; k < count; k++) {
+        to->low[k] = values[k] < to->low[k] ? values[k] : to->low[k];
+        to->high[k] = values[k] > to->high[k] ? values[k] : to->high[k];
+        to->zero[k] += 0.0f * values[k];
+    }
+}
+
+/* Adds values to the range; false if one is not finite. */
+static bool range_add(float_range *range, const float *values, size_t count)
+{
+    range_lanes lanes = {.zero = {0.0f}};
+    size_t i = 0;
+    for (int32_t k = 0; k < LANES; k++) lanes.low[k] = lanes.high[k] = values[0];
+    for (; i + LANES <= count; i += LANES) lanes_add(&lanes, values + i, LANES);
+    lanes_add(&lanes, values + i, count - i);
+    float low = lanes.low[0], high = lanes.high[0], zero = 0.0f;
+    for (int32_t k = 0; k < LANES; k++) {
+        low = lanes.low[k] < low ? lanes.low[k] : low;
+        high = lanes.high[k] > high ? lanes.high[k] : high;
+        zero += lanes.zero[k];
+    }
+    float found = atomic_load(&range->low);
+    while (low < found && !atomic_compare_exchange_weak(&range->low, &found, low)) {
+    }
+    found = atomic_load(&range->high);
+    while (high > found && !atomic_compare_exchange_weak(&range->high, &found, high)) {
+    }
+    return zero == 0.0f;
+}
+
+typedef struct range_job {
+    const height_level *level;
+    float_range range;
+} range_job;
+
+static void range_rows(void *user, size_t begin, size_t end, int32_t thread)
+{
+    (void)thread;
+    range_job *job = user;
+    size_t width = (size_t)job->level->width;
+    range_add(&job->range, (const float *)job->level->samples + begin * width, (end - begin) * width);
+}
+
+void height_level_range(knurl_context *context, const height_level *level, double range[2])
+{
+    range_job job = {.level = level};
+    range_init(&job.range);
+    knurl_parallel_for(context, (size_t)level->height, row_grain(level->width), range_rows, &job);
+    range_result(&job.range, range);
+}
+
 /* Level 0 */
 
 typedef struct copy_job {
@@ -36,6 +115,7 @@ typedef struct copy_job {
     unsigned char *to;
     size_t width, channels, channel;
     size_t sample_bytes;
+    float_range range;
     atomic_size_t first_bad; /* index of the first sample that is not finite, SIZE_MAX: none */
 } copy_job;
 
@@ -60,18 +140,17 @@ static void copy_rows(void *user, size_t begin, size_t end, int32_t thread)
     }
     if (bytes != sizeof(float)) return;
     const float *values = (const float *)(const void *)job->to;
-    for (size_t i = first; i < last; i++) {
-        if (isfinite(values[i])) continue;
-        note_bad(job, i);
-        return;
-    }
+    if (range_add(&job->range, values + first, last - first)) return;
+    while (isfinite(values[first])) first++;
+    note_bad(job, first);
 }
 
 knurl_status height_level_copy(knurl_context *context, const knurl_image *image, int32_t channel,
-                               height_level *level, knurl_error *error)
+                               height_level *level, double range[2], knurl_error *error)
 {
-    *level =
-        (height_level){knurl_image_width(image), knurl_image_height(image), knurl_image_format(image), NULL};
+    *level = (height_level){.width = knurl_image_width(image),
+                            .height = knurl_image_height(image),
+                            .format = knurl_image_format(image)};
     size_t bytes = height_level_bytes(level);
     void *samples = knurl_alloc(context, bytes);
     if (!samples) return knurl_fail_memory(error, bytes, "the samples of a height map");
@@ -83,8 +162,10 @@ knurl_status height_level_copy(knurl_context *context, const knurl_image *image,
                     .channel = (size_t)channel,
                     .sample_bytes = (size_t)level->format};
     atomic_init(&job.first_bad, SIZE_MAX);
+    range_init(&job.range);
     knurl_parallel_for(context, (size_t)level->height, row_grain(level->width), copy_rows, &job);
     size_t bad = atomic_load(&job.first_bad);
+    if (level->format == KNURL_PIXEL_F32) range_result(&job.range, range);
     if (bad == SIZE_MAX) return KNURL_OK;
     double value = (double)((const float *)samples)[bad];
     height_level_destroy(context, level);
@@ -110,7 +191,8 @@ static inline taps axis_taps(int32_t fine, int32_t coarse, int32_t i)
 
 typedef struct filter_job {
     const height_level *fine, *coarse;
-    void *to;
+    void *samples; /* of the coarse level */
+    height_rect to;
 } filter_job;
 
 /* Both sizes even: the common case. */
@@ -134,9 +216,9 @@ static void halve_row_u8(const uint8_t *a, const uint8_t *b, uint16_t *to, int32
 static void filter_row_integer(const filter_job *job, int32_t y)
 {
     const height_level *fine = job->fine, *coarse = job->coarse;
-    uint16_t *to = (uint16_t *)job->to + (size_t)y * (size_t)coarse->width;
+    uint16_t *to = (uint16_t *)job->samples + (size_t)y * (size_t)coarse->width;
     taps v = axis_taps(fine->height, coarse->height, y);
-    for (int32_t x = 0; x < coarse->width; x++) {
+    for (int32_t x = job->to.x0; x < job->to.x1; x++) {
         taps h = axis_taps(fine->width, coarse->width, x);
         uint64_t sum = 0, total = (uint64_t)v.total * h.total;
         for (int32_t j = 0; j < v.count; j++) {
@@ -159,10 +241,10 @@ static void filter_row_integer(const filter_job *job, int32_t y)
 static void filter_row_float(const filter_job *job, int32_t y)
 {
     const height_level *fine = job->fine, *coarse = job->coarse;
-    float *to = (float *)job->to + (size_t)y * (size_t)coarse->width;
+    float *to = (float *)job->samples + (size_t)y * (size_t)coarse->width;
     const float *from = fine->samples;
     taps v = axis_taps(fine->height, coarse->height, y);
-    for (int32_t x = 0; x < coarse->width; x++) {
+    for (int32_t x = job->to.x0; x < job->to.x1; x++) {
         taps h = axis_taps(fine->width, coarse->width, x);
         double sum = 0.0;
         for (int32_t j = 0; j < v.count; j++) {
@@ -181,33 +263,56 @@ static void filter_rows(void *user, size_t begin, size_t end, int32_t thread)
     const filter_job *job = user;
     const height_level *fine = job->fine;
     bool halve = fine->width % 2 == 0 && fine->height % 2 == 0;
-    size_t width = (size_t)fine->width;
-    for (size_t y = begin; y < end; y++) {
-        uint16_t *to = (uint16_t *)job->to + y * (size_t)job->coarse->width;
+    size_t width = (size_t)fine->width, first = (size_t)job->to.x0;
+    int32_t count = job->to.x1 - job->to.x0;
+    for (size_t i = begin; i < end; i++) {
+        size_t y = (size_t)job->to.y0 + i, at = 2 * y * width + 2 * first;
+        uint16_t *to = (uint16_t *)job->samples + y * (size_t)job->coarse->width + first;
         if (fine->format == KNURL_PIXEL_F32) {
             filter_row_float(job, (int32_t)y);
         } else if (!halve) {
             filter_row_integer(job, (int32_t)y);
         } else if (fine->format == KNURL_PIXEL_U16) {
-            const uint16_t *a = (const uint16_t *)fine->samples + 2 * y * width;
-            halve_row_u16(a, a + width, to, job->coarse->width);
+            const uint16_t *a = (const uint16_t *)fine->samples + at;
+            halve_row_u16(a, a + width, to, count);
         } else {
-            const uint8_t *a = (const uint8_t *)fine->samples + 2 * y * width;
-            halve_row_u8(a, a + width, to, job->coarse->width);
+            const uint8_t *a = (const uint8_t *)fine->samples + at;
+            halve_row_u8(a, a + width, to, count);
         }
     }
+}
+
+void height_level_refilter(knurl_context *context, const height_level *fine, const height_level *coarse,
+                           height_rect to)
+{
+    filter_job job = {fine, coarse, (void *)coarse->samples, to};
+    knurl_parallel_for(context, (size_t)(to.y1 - to.y0), row_grain(to.x1 - to.x0), filter_rows, &job);
 }
 
 knurl_status height_level_filter(knurl_context *context, const height_level *fine, height_level *coarse,
                                  knurl_error *error)
 {
-    *coarse = (height_level){fine->width > 1 ? fine->width / 2 : 1, fine->height > 1 ? fine->height / 2 : 1,
-                             fine->format == KNURL_PIXEL_F32 ? KNURL_PIXEL_F32 : KNURL_PIXEL_U16, NULL};
+    *coarse = (height_level){.width = fine->width > 1 ? fine->width / 2 : 1,
+                             .height = fine->height > 1 ? fine->height / 2 : 1,
+                             .format = fine->format == KNURL_PIXEL_F32 ? KNURL_PIXEL_F32 : KNURL_PIXEL_U16};
     size_t bytes = height_level_bytes(coarse);
-    void *samples = knurl_alloc(context, bytes);
-    if (!samples) return knurl_fail_memory(error, bytes, "a level of a height map");
-    coarse->samples = samples;
-    filter_job job = {fine, coarse, samples};
-    knurl_parallel_for(context, (size_t)coarse->height, row_grain(coarse->width), filter_rows, &job);
+    coarse->samples = knurl_alloc(context, bytes);
+    if (!coarse->samples) return knurl_fail_memory(error, bytes, "a level of a height map");
+    height_level_refilter(context, fine, coarse, (height_rect){0, 0, coarse->width, coarse->height});
     return KNURL_OK;
+}
+
+/* Coarse samples [*first, *end) whose taps (axis_taps) are among fine samples [*first, *end). */
+static void axis_readers(int32_t fine, int32_t coarse, int32_t *first, int32_t *end)
+{
+    int32_t last = (*end - 1) / 2;
+    *first = fine % 2 == 0 || *first == 0 ? *first / 2 : (*first - 1) / 2;
+    *end = (last < coarse ? last : coarse - 1) + 1;
+}
+
+height_rect height_level_readers(const height_level *fine, const height_level *coarse, height_rect changed)
+{
+    axis_readers(fine->width, coarse->width, &changed.x0, &changed.x1);
+    axis_readers(fine->height, coarse->height, &changed.y0, &changed.y1);
+    return changed;
 }

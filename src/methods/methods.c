@@ -4,8 +4,8 @@
 #include <string.h>
 
 static const method *const methods[] = {
-    &method_rmip,       &method_tfdm,   &method_pdm,           &method_secant,     &method_tessellation,
-    &method_texel_walk, &method_binary, &method_robust_binary, &method_empty_skip,
+    &method_fast,         &method_rmip,       &method_tfdm,   &method_pdm,           &method_secant,
+    &method_tessellation, &method_texel_walk, &method_binary, &method_robust_binary, &method_empty_skip,
 };
 
 enum { METHOD_COUNT = sizeof methods / sizeof methods[0] };

@@ -48,21 +48,17 @@ accel_box scene_instance_box(const scene_instance *instance, const accel_box *bo
     return out;
 }
 
-knurl_ray scene_instance_ray(const scene_instance *instance, const knurl_ray *ray)
+void scene_instance_move_ray(const scene_instance *instance, knurl_ray *ray)
 {
-    knurl_ray local = *ray;
-    if (instance->identity) return local;
     vec3 origin = v3_sub(v3_load(ray->origin), instance->translation);
-    v3_store(local.origin, affine_vector(&instance->inverse, origin));
-    v3_store(local.direction, affine_vector(&instance->inverse, v3_load(ray->direction)));
-    local.cone_width = (float)((double)ray->cone_width * instance->inverse_scale);
-    local.cone_spread = (float)((double)ray->cone_spread * instance->inverse_scale);
-    return local;
+    v3_store(ray->origin, affine_vector(&instance->inverse, origin));
+    v3_store(ray->direction, affine_vector(&instance->inverse, v3_load(ray->direction)));
+    ray->cone_width = (float)((double)ray->cone_width * instance->inverse_scale);
+    ray->cone_spread = (float)((double)ray->cone_spread * instance->inverse_scale);
 }
 
-void scene_instance_hit(const scene_instance *instance, knurl_hit *hit)
+void scene_instance_move_hit(const scene_instance *instance, knurl_hit *hit)
 {
-    if (instance->identity) return;
     vec3 p = v3_load(hit->position);
     vec3 turned = affine_vector(&instance->to_world, p), world = v3_add(turned, instance->translation);
     v3_store(hit->position, world);

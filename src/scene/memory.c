@@ -39,6 +39,7 @@ knurl_scene_memory knurl_scene_get_memory(const knurl_scene *scene)
         memory.map_parts.levels += parts.levels;
         memory.map_parts.minmax += parts.minmax;
         memory.map_parts.rmip += parts.rmip;
+        memory.map_parts.blocks += parts.blocks;
     }
     memory.bvh = accel_device_bytes(scene->device);
     return memory;

@@ -135,6 +135,25 @@ static bool instance_bounds(const void *user, uint32_t number, accel_box *box)
     return instance->mask != 0 && !accel_box_is_empty(box);
 }
 
+/* Instances' boxes, those of one object or of all (UINT32_MAX), and what is above them. */
+static knurl_status place_instances(knurl_scene *scene, uint32_t object, knurl_error *error)
+{
+    scene->box = accel_box_empty();
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        scene_instance *instance = &scene->instances[i];
+        if (object == UINT32_MAX || instance->object == object) {
+            accel_box box = accel_object_bounds(&scene->objects[instance->object]);
+            instance->box = scene_instance_box(instance, &box);
+        }
+        if (instance->mask) scene->box = accel_box_union(&scene->box, &instance->box);
+    }
+    accel_bvh_release(scene->top);
+    scene->top = NULL;
+    if (scene->instance_count <= SCENE_FEW_INSTANCES) return KNURL_OK;
+    return accel_bvh_create(scene->device, scene->instance_count, instance_bounds, scene,
+                            "the hierarchy of instances", &scene->top, error);
+}
+
 knurl_status knurl_scene_commit(knurl_scene *scene, knurl_error *error)
 {
     knurl_status status = check_open(scene, error);
@@ -145,20 +164,30 @@ knurl_status knurl_scene_commit(knurl_scene *scene, knurl_error *error)
         status = accel_object_build(object, scene->device, i, error);
         if (status != KNURL_OK) return status;
     }
-    scene->box = accel_box_empty();
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
-        scene_instance *instance = &scene->instances[i];
-        accel_box box = accel_object_bounds(&scene->objects[instance->object]);
-        instance->box = scene_instance_box(instance, &box);
-        if (instance->mask) scene->box = accel_box_union(&scene->box, &instance->box);
-    }
-    if (scene->instance_count > SCENE_FEW_INSTANCES) {
-        status = accel_bvh_create(scene->device, scene->instance_count, instance_bounds, scene,
-                                  "the hierarchy of instances", &scene->top, error);
-        if (status != KNURL_OK) return status;
-    }
-    scene->committed = true;
-    return KNURL_OK;
+    status = place_instances(scene, UINT32_MAX, error);
+    scene->committed = status == KNURL_OK;
+    return status;
+}
+
+knurl_status knurl_scene_update(knurl_scene *scene, uint32_t number, knurl_error *error)
+{
+    if (!scene) return knurl_fail(error, KNURL_ERROR_ARGUMENT, "scene is NULL");
+    if (number >= scene->object_count)
+        return knurl_fail(error, KNURL_ERROR_ARGUMENT, "scene update: object is %u, expected under %u",
+                          number, scene->object_count);
+    accel_object *object = &scene->objects[number];
+    if (!object->surface || !object->bvh) return KNURL_OK; /* never changes; or the commit will see to it */
+    accel_box before = accel_object_bounds(object);
+    accel_bvh_release(object->bvh);
+    object->bvh = NULL;
+    bool committed = scene->committed;
+    scene->committed = false;
+    knurl_status status = accel_object_build(object, scene->device, number, error);
+    if (status != KNURL_OK || !committed) return status;
+    accel_box after = accel_object_bounds(object);
+    if (!accel_box_equal(&before, &after)) status = place_instances(scene, number, error);
+    scene->committed = status == KNURL_OK;
+    return status;
 }
 
 void knurl_scene_bounds(const knurl_scene *scene, double lower[3], double upper[3])

@@ -1,6 +1,6 @@
-/* Per-triangle data: height range, range of |N|, folds, degenerate triangles; and boxes. */
+/* Per-triangle data: range of |N|, folds, degenerate triangles; and boxes. */
 #include "math/poly.h"
-#include "shell/shell.h"
+#include "shell/heights.h"
 
 #include <string.h>
 
@@ -98,45 +98,6 @@ static bool is_flat_uv(const triangle_frame *f)
     return !(area > 1e-9 * edge) || edge < 1e-12;
 }
 
-/* Range of the reconstruction of level k over the triangle's box in texture space. Few samples are
- * read one by one: a bound through level 0 would have to grow by 1.5 texels of level k, which is
- * loose where the triangle covers only a few of them. */
-static knurl_range level_range(const shell_space *space, uint32_t triangle, int32_t k)
-{
-    enum { FEW_SAMPLES = 256 };
-    height_lod lod;
-    triangle_frame f;
-    height_lod_make(space, (double)k, &lod);
-    triangle_frame_load(space, triangle, &lod, &f);
-    double pad = 4.0 * f.texel_rounding;
-    double x0 = min_d(f.x[0], min_d(f.x[1], f.x[2])) - pad, x1 = max_d(f.x[0], max_d(f.x[1], f.x[2])) + pad;
-    double y0 = min_d(f.y[0], min_d(f.y[1], f.y[2])) - pad, y1 = max_d(f.y[0], max_d(f.y[1], f.y[2])) + pad;
-    if (k == 0 || (x1 - x0 + 2.0) * (y1 - y0 + 2.0) > (double)FEW_SAMPLES)
-        return shell_height_range(space, &lod, KNURL_BOUNDS_RMIP, &f, x0, y0, x1, y1);
-    knurl_range range = {INFINITY, -INFINITY};
-    for (int64_t j = (int64_t)floor_d(y0); j <= (int64_t)floor_d(y1); j++)
-        for (int64_t i = (int64_t)floor_d(x0); i <= (int64_t)floor_d(x1); i++) {
-            height_patch patch;
-            height_patch_load(space, &lod, &f, i, j, 0, 0, &patch);
-            range.min = min_d(range.min, patch.min);
-            range.max = max_d(range.max, patch.max);
-        }
-    return range;
-}
-
-/* Range of h over the triangle at every level of detail: averages of a coarse level reach beyond the
- * triangle, and may leave the range of level 0 over it. */
-static knurl_range all_levels_range(const shell_space *space, uint32_t triangle)
-{
-    knurl_range range = {INFINITY, -INFINITY};
-    for (int32_t k = 0; k < space->map->level_count; k++) {
-        knurl_range level = level_range(space, triangle, k);
-        range.min = min_d(range.min, level.min);
-        range.max = max_d(range.max, level.max);
-    }
-    return range;
-}
-
 /* Range of s = h / |N| for h in the shell's range, padded by more than the rounding of
  * g(s) = s |N| - h, so that g has a definite sign at both ends even where h is constant. */
 static void set_height_range(const triangle_frame *f, shell *stored)
@@ -159,13 +120,10 @@ static double offset_area(const triangle_frame *f, double s)
     return v3_length(v3_cross(v3_mad(f->pe, s, f->ne), v3_mad(f->pf, s, f->nf)));
 }
 
-static void build_shell(const shell_space *space, const height_lod *lod, uint32_t triangle)
+void shell_shape(const shell_space *space, const height_lod *lod, uint32_t triangle)
 {
     shell *stored = &space->shells[triangle];
-    *stored = (shell){.normal_min = 1.0f};
-    knurl_range range = all_levels_range(space, triangle);
-    stored->height_min = round_down(range.min);
-    stored->height_max = round_up(range.max);
+    stored->flags = 0;
     triangle_frame f;
     triangle_frame_load(space, triangle, lod, &f);
     double least = least_normal(&f);
@@ -174,13 +132,15 @@ static void build_shell(const shell_space *space, const height_lod *lod, uint32_
     f.s0 = (double)stored->s_min;
     f.s1 = (double)stored->s_max;
     stored->area = round_up((1.0 + 1e-9) * max_d(offset_area(&f, f.s0), offset_area(&f, f.s1)));
+    unsigned flags = 0;
     if (is_empty(&f))
-        stored->flags |= SHELL_EMPTY;
+        flags |= SHELL_EMPTY;
     else if (is_folded(&f, space->directions ? FOLD_MARGIN_DIRECTIONS : FOLD_MARGIN) ||
              (!space->unnormalised && least < LEAST_NORMAL))
-        stored->flags |= SHELL_FOLDED;
-    if (is_flat_uv(&f)) stored->flags |= SHELL_FLAT_UV;
-    if (all_equal_normals(&f)) stored->flags |= SHELL_CONSTANT_NORMAL;
+        flags |= SHELL_FOLDED;
+    if (is_flat_uv(&f)) flags |= SHELL_FLAT_UV;
+    if (all_equal_normals(&f)) flags |= SHELL_CONSTANT_NORMAL;
+    stored->flags = (uint16_t)flags;
 }
 
 static void build_range(void *user, size_t begin, size_t end, int32_t thread)
@@ -189,7 +149,10 @@ static void build_range(void *user, size_t begin, size_t end, int32_t thread)
     (void)thread;
     height_lod lod;
     height_lod_make(space, 0.0, &lod);
-    for (size_t t = begin; t < end; t++) build_shell(space, &lod, (uint32_t)t);
+    for (size_t t = begin; t < end; t++) {
+        shell_heights(space, (uint32_t)t, &space->shells[t]);
+        shell_shape(space, &lod, (uint32_t)t);
+    }
 }
 
 /* Length of a texel of level 0 on the base mesh: square root of area over texels. */

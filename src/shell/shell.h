@@ -30,7 +30,8 @@ typedef struct shell {
     float normal_min;             /* lower bound of |N| over the triangle */
     float s_min, s_max;           /* range of s = h / |N|, padded and rounded outwards */
     float area;                   /* bound on twice the area of the offset triangles at s_min and s_max */
-    uint32_t flags;
+    uint16_t flags;
+    uint8_t low_level, high_level; /* levels of detail that height_min and height_max are from */
 } shell;
 
 /* What all shells of a surface share. */
@@ -38,7 +39,8 @@ typedef struct shell_space {
     knurl_context *context;
     base_mesh mesh;
     shell *shells;
-    knurl_heightmap *map; /* never NULL: a 1 x 1 map stands for "none" */
+    knurl_heightmap *map;     /* never NULL: a 1 x 1 map stands for "none" */
+    knurl_bounds_kind bounds; /* that shells' heights come from, whatever the map has by now */
     double factor, offset;
     knurl_wrap wrap_u, wrap_v;
     double uv[6]; /* u = uv[0] s + uv[1] t + uv[2], v = uv[3] s + uv[4] t + uv[5] */
@@ -136,6 +138,10 @@ typedef struct shell_root {
 
 /* Brings the root to full precision with Newton's method on S(b) - O - t D = 0. */
 void shell_root_polish(const triangle_frame *frame, const knurl_ray *ray, shell_root *root);
+/* Newton's method on S(b) - O - t D = 0 from b1, b2 and t of *root, on its patch, to the end: the last step
+ * is within `error`, the bounds on what rounding makes of b1 and b2. False if it does not get there, as near
+ * tangencies, or leaves the triangle far behind. */
+bool shell_root_solve(const triangle_frame *frame, const knurl_ray *ray, shell_root *root, double error[2]);
 /* Fills every field but steps, object and instance. */
 void shell_hit_fill(const shell_space *space, const height_lod *lod, const triangle_frame *frame,
                     uint32_t triangle, const knurl_ray *ray, const shell_root *root, knurl_hit *hit);

@@ -55,6 +55,7 @@ static void build(fixture *f, const char *file)
     knurl_build_def build_def = knurl_build_def_default();
     f->image_seconds = -1;
     build_def.image_seconds = &f->image_seconds;
+    build_def.surface.method = "rmip";
     if (knurl_scene_build(f->description, &build_def, &f->scene, &error) != KNURL_OK)
         fail_msg("%s", error.message);
 }
@@ -163,8 +164,9 @@ static void test_memory(void **state)
     build(&f, "displaced.gltf");
     knurl_scene_memory memory = knurl_scene_get_memory(f.scene);
     const knurl_heightmap_bytes *parts = &memory.map_parts;
-    assert_true(parts->samples > 0 && parts->rmip > 0);
-    assert_int_equal(parts->samples + parts->levels + parts->minmax + parts->rmip, memory.maps);
+    assert_true(parts->samples > 0 && parts->minmax > 0 && parts->rmip > 0);
+    assert_int_equal(parts->samples + parts->levels + parts->minmax + parts->rmip + parts->blocks,
+                     memory.maps);
     assert_true(f.image_seconds > 0 && f.image_seconds < 60);
     tear_down(&f);
 }

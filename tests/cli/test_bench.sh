@@ -8,11 +8,41 @@ import random
 random.seed(1)
 open("noise.pgm", "wb").write(b"P5\n40 30\n255\n" + bytes(random.randrange(256) for _ in range(1200)))'
 surface="plane.obj --disp noise.pgm --disp-factor 0.2"
+# A closed surface: an octahedron whose vertices have one normal and one texture coordinate each.
+cat >ball.obj <<'OBJ'
+v 1 0 0
+v 0 1 0
+v 0 0 1
+v -1 0 0
+v 0 -1 0
+v 0 0 -1
+vt 1 0.5
+vt 0.45 0.4
+vt 0.5 1
+vt 0 0.5
+vt 0.55 0.6
+vt 0.5 0
+vn 1 0 0
+vn 0 1 0
+vn 0 0 1
+vn -1 0 0
+vn 0 -1 0
+vn 0 0 -1
+f 1/1/1 2/2/2 3/3/3
+f 3/3/3 2/2/2 4/4/4
+f 4/4/4 2/2/2 6/6/6
+f 6/6/6 2/2/2 1/1/1
+f 3/3/3 5/5/5 1/1/1
+f 4/4/4 5/5/5 3/3/3
+f 6/6/6 5/5/5 4/4/4
+f 1/1/1 5/5/5 6/6/6
+OBJ
+ball="ball.obj --disp noise.pgm --disp-factor 0.2"
 variant=rmip:marching-scale=1:inversion=off:bounds=minmax
 all_rays=primary,grazing,diffuse,diffuse-shuffled,occlusion,inside,inside-shuffled
 
 # Every key of the contract, and rows in order.
-expect 0 "$knurl" bench $surface --methods rmip,$variant --rays $all_rays --count 600 --rounds 2 --threads 2 \
+expect 0 "$knurl" bench $ball --methods rmip,$variant --rays $all_rays --count 600 --rounds 2 --threads 2 \
     --json out.json --csv out.csv --heat-map steps.png --frame 16x9x2
 cp stdout.txt table.txt
 "$python" - "$variant" <<'PY'
@@ -27,17 +57,18 @@ rows = data["results"]
 expected = [(k, t, m) for k in kinds for t in (1, 2) for m in ("rmip", variant)]
 expected += [("frame", 2, "rmip"), ("frame", 2, variant)]
 assert [(r["rays"], r["threads"], r["method"]) for r in rows] == expected
-keys = ["scene", "method", "rays", "threads", "count", "mrays_min", "mrays_median", "mrays_max",
+keys = ["scene", "method", "rays", "threads", "calls", "count", "mrays_min", "mrays_median", "mrays_max",
         "mrays_cpu_median", "frame_ms_median", "steps_mean", "steps_p99", "steps_max", "build_ms", "bytes", "missed", "false",
         "dt_median", "dt_p99", "reference", "error"]
-structures = ["mesh", "shells", "bvh", "map_samples", "map_levels", "map_minmax", "map_rmip", "total"]
+structures = ["mesh", "shells", "bvh", "map_samples", "map_levels", "map_minmax", "map_rmip", "map_blocks", "total"]
 for r in rows:
     assert list(r) == keys, list(r)
-    assert r["scene"] == "plane.obj" and r["error"] is None
+    assert r["scene"] == "ball.obj" and r["error"] is None, r
     assert 0 < r["mrays_min"] <= r["mrays_median"] <= r["mrays_max"]
     assert list(r["bytes"]) == structures and r["build_ms"] > 0
     assert r["bytes"]["total"] == sum(r["bytes"][s] for s in structures[:-1]) and r["bytes"]["map_samples"] == 1200
     frame = r["rays"] == "frame"
+    assert r["calls"] == (None if frame else "single" if r["threads"] == 1 else "batch"), r
     assert (r["mrays_cpu_median"] is None) == frame and (frame or r["mrays_cpu_median"] > 0)
     assert (r["frame_ms_median"] is not None) == frame and (r["reference"] is None) == frame
     if frame:
@@ -60,11 +91,11 @@ for kind in ("diffuse", "inside"):
     a, b = of(kind), of(kind + "-shuffled")
     assert abs(a["steps_mean"] - b["steps_mean"]) < 1e-9 and a["steps_max"] == b["steps_max"], (a, b)
 assert of("grazing")["steps_mean"] != of("diffuse")["steps_mean"]
-assert [m["file"] for m in data["heat_maps"]] == ["steps.plane.0.png", "steps.plane.1.png"]
+assert [m["file"] for m in data["heat_maps"]] == ["steps.ball.0.png", "steps.ball.1.png"]
 assert len({m["white"] for m in data["heat_maps"]}) == 1 and data["heat_maps"][0]["white"] >= of("primary")["steps_max"]
 
 table = list(csv.DictReader(open("out.csv", newline="")))
-assert list(table[0]) == keys[:14] + ["bytes_" + s for s in structures] + keys[15:]
+assert list(table[0]) == keys[:15] + ["bytes_" + s for s in structures] + keys[16:]
 assert len(table) == len(rows)
 for a, b in zip(table, rows):
     assert None not in a and None not in a.values(), a
@@ -79,7 +110,7 @@ PY
 expect_text table.txt "rmip ($variant)"
 expect_text table.txt "inside-shuffled"
 [ "$(grep -c '^frame ' table.txt)" -eq 2 ] || fail "frames are not in the table"
-expect 0 "$knurl" info steps.plane.0.png
+expect 0 "$knurl" info steps.ball.0.png
 expect_text stdout.txt "32 x 16, 3 channels, u8"
 
 # Rays, hits and steps depend on the seed alone: not on the methods beside them, nor on the threads.
@@ -91,14 +122,65 @@ rows = json.load(open(sys.argv[1]))["results"]
 print([[r[k] for k in keys] for r in rows if r["method"] == "rmip" and r["threads"] == 1 and r["rays"] != "frame"])' "$1"
 }
 work out.json >work.txt
-expect 0 "$knurl" bench $surface --methods $variant,rmip --rays $all_rays --count 600 --rounds 1 --threads 1 \
+expect 0 "$knurl" bench $ball --methods $variant,rmip --rays $all_rays --count 600 --rounds 1 --threads 1 \
     --json again.json -q
 work again.json | cmp -s - work.txt || fail "rays depend on the methods or threads"
 [ "$("$python" -c 'import json; print(len(json.load(open("again.json"))["results"]))')" -eq 14 ] ||
     fail "with one thread there is one row per method and set"
-expect 0 "$knurl" bench $surface --methods rmip --rays $all_rays --count 600 --rounds 1 --threads 1 --seed 7 \
+expect 0 "$knurl" bench $ball --methods rmip --rays $all_rays --count 600 --rounds 1 --threads 1 --seed 7 \
     --json seed.json -q
 work seed.json | cmp -s - work.txt && fail "--seed changes nothing"
+
+# Both kinds of calls on one thread and on two: the same hits and steps.
+expect 0 "$knurl" bench $ball --methods rmip,tessellation --rays primary,occlusion,inside-shuffled --count 2000 \
+    --rounds 2 --threads 2 --calls both --json calls.json -q
+"$python" - <<'PY'
+import json
+rows = json.load(open("calls.json"))["results"]
+ways = [(1, "single"), (1, "batch"), (2, "single"), (2, "batch")]
+expected = [(k, t, c, m) for k in ("primary", "occlusion", "inside-shuffled") for t, c in ways
+            for m in ("rmip", "tessellation")]
+assert [(r["rays"], r["threads"], r["calls"], r["method"]) for r in rows] == expected
+for r in rows:
+    assert 0 < r["mrays_min"] <= r["mrays_median"] and r["mrays_cpu_median"] > 0 and r["error"] is None, r
+    if r["method"] == "rmip":
+        assert r["missed"] == 0 and r["false"] == 0, r
+        assert r["steps_mean"] == rows[expected.index((r["rays"], 1, "single", "rmip"))]["steps_mean"]
+PY
+expect 0 "$knurl" bench $ball --methods rmip --rays primary --count 600 --rounds 1 --threads 1 --calls batch --csv calls.csv
+[ "$(grep -c '^ball.obj,rmip,primary,1,batch,' calls.csv)" -eq 1 ] && [ "$(wc -l <calls.csv)" -eq 2 ] ||
+    fail "--calls batch on one thread"
+
+# Rays from inside are for closed scenes.
+expect 0 "$knurl" bench $surface --methods rmip --rays primary,inside,inside-shuffled --count 600 --rounds 1 --json open.json
+expect_text stdout.txt "rmip: the scene is not closed: "
+"$python" -c '
+import json
+rows = json.load(open("open.json"))["results"]
+assert all((r["error"] is None) == (r["rays"] == "primary") for r in rows) and len(rows) >= 3, rows'
+
+# Rays that start a little off the surface do not meet facets at once.
+for lift in 0 0.05; do
+    expect 0 "$knurl" bench $ball --methods tessellation --rays primary,diffuse --count 2000 --rounds 1 --threads 1 \
+        --lift $lift --json lift$lift.json -q
+done
+"$python" -c '
+import json
+a, b = (json.load(open(f))["results"] for f in ("lift0.json", "lift0.05.json"))
+assert a[0]["false"] == b[0]["false"] and a[1]["false"] > 10 * b[1]["false"] + 10, (a[1]["false"], b[1]["false"])'
+
+# Undisplaced meshes left out.
+expect 0 "$knurl" demo sphere . --size 32 -q
+for only in "" --displaced-only; do
+    expect 0 "$knurl" bench sphere/sphere.gltf --methods rmip --rays primary,inside --count 600 --rounds 1 \
+        --threads 1 $only --json "only$only.json" -q
+done
+"$python" -c '
+import json
+a, b = (json.load(open(f))["results"] for f in ("only.json", "only--displaced-only.json"))
+assert all(r["error"] is None and r["missed"] == 0 for r in a + b)
+assert a[0]["bytes"]["bvh"] > b[0]["bytes"]["bvh"] > 0 and a[0]["bytes"]["mesh"] > b[0]["bytes"]["mesh"]
+assert a[0]["bytes"]["map_samples"] == b[0]["bytes"]["map_samples"]'
 
 # Scales, a level of detail, and a reference of one's own.
 expect 0 "$knurl" bench $surface --methods rmip --rays primary --count 600 --rounds 1 --json - --lod 1.5 \
@@ -140,12 +222,12 @@ grep -q '"scene": "plane.obj"' partly.json || fail "finished rows are lost"
 found=0
 "$python" - "$knurl" $surface <<'PY' || found=$?
 import json, signal, subprocess, sys
-run = subprocess.Popen([sys.argv[1], "bench", *sys.argv[2:], "--methods", "rmip", "--rays", "primary,inside", "--count",
+run = subprocess.Popen([sys.argv[1], "bench", *sys.argv[2:], "--methods", "rmip", "--rays", "primary,diffuse", "--count",
                         "600", "--rounds", "1", "--json", "stopped.json", "--frame", "2000x2000x100"],
                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
                        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
 for line in run.stdout:
-    if line.startswith("inside"):
+    if line.startswith("diffuse"):
         run.send_signal(signal.SIGINT)
         break
 run.stdout.read()
@@ -158,11 +240,12 @@ PY
 
 # Wrong command lines
 expect_error 2 "the scene file is missing" "$knurl" bench --methods rmip
-expect_error 2 "--methods: method 'magic' is not known; methods are rmip" "$knurl" bench plane.obj --methods rmip,magic
+expect_error 2 "--methods: method 'magic' is not known; methods are " "$knurl" bench plane.obj --methods rmip,magic
 expect_error 2 "method rmip: found 'speed=9', expected" "$knurl" bench plane.obj --methods rmip:speed=9
 expect_error 2 "--methods: found 'rmip,', expected names" "$knurl" bench plane.obj --methods rmip,
 expect_error 2 "--rays: found 'secondary', expected one of primary, grazing" "$knurl" bench plane.obj --rays secondary
 expect_error 2 "--rays: found 'none' without --frame" "$knurl" bench plane.obj --rays none
+expect_error 2 "--calls: found 'packets', expected one of single, batch, both" "$knurl" bench plane.obj --calls packets
 expect_error 2 "--reference: method 'magic'" "$knurl" bench plane.obj --reference magic
 expect_error 2 "--frame: found '10x10', expected WIDTHxHEIGHTxSAMPLES" "$knurl" bench plane.obj --frame 10x10
 expect_error 2 "--count: found '3', expected a whole number from 64" "$knurl" bench plane.obj --count 3

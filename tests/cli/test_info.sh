@@ -15,7 +15,7 @@ assert list(info) == ["knurl", "kind", "path", "width", "height", "channels", "f
 assert (info["kind"], info["width"], info["height"], info["bits"]) == ("image", 4, 2, 8)
 assert info["channel_ranges"][0]["min"] == 0 and info["channel_ranges"][0]["max"] == 1
 assert list(info["map"]) == ["levels", "range", "bytes", "build_ms", "tiled"]
-assert list(info["map"]["bytes"]) == ["samples", "levels", "minmax", "rmip", "total"]
+assert list(info["map"]["bytes"]) == ["samples", "levels", "minmax", "rmip", "blocks", "total"]
 assert info["map"]["levels"] == 3 and info["map"]["range"] == [0, 1]
 assert info["timing"]["copied_bytes"] == 8 and info["timing"]["bounds_ms"] >= 0
 PY

@@ -47,7 +47,7 @@ expect_error 2 "--height: found '99999999999999999999', expected" "$knurl" rende
 expect_error 2 "--spp: found 'many', expected" "$knurl" render plane.obj -o a.png --spp many
 expect_error 2 "--seed: found '-1', expected" "$knurl" render plane.obj -o a.png --seed -1
 expect_error 2 "--integrator: found 'light', expected one of path, ao, primary" "$knurl" render plane.obj -o a.png --integrator light
-expect_error 2 "--method: method 'magic' is not known; methods are rmip" "$knurl" render plane.obj -o a.png --method magic
+expect_error 2 "--method: method 'magic' is not known; methods are fast, rmip" "$knurl" render plane.obj -o a.png --method magic
 expect_error 2 "--background: found '1,2', expected three numbers" "$knurl" render plane.obj -o a.png --background 1,2
 expect_error 2 "--background: found '1,2,nan', expected three numbers" "$knurl" render plane.obj -o a.png --background 1,2,nan
 expect_error 2 "--crop: found '0,0,10', expected four whole numbers" "$knurl" render plane.obj -o a.png --crop 0,0,10

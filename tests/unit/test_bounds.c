@@ -67,6 +67,7 @@ static knurl_heightmap *make_map(knurl_context *context, const int32_t size[2], 
     def.minmax_cell = cells[1];
     knurl_heightmap *map = NULL;
     assert_int_equal(knurl_heightmap_create(context, &def, &map, NULL), KNURL_OK);
+    assert_int_equal(heightmap_need(map, HEIGHT_NEED_RMIP, NULL), KNURL_OK);
     knurl_image_release(image);
     return map;
 }
@@ -231,6 +232,7 @@ static void test_single_spikes(void **state)
             def.minmax_cell = 1 << (spike / 4 % 4);
             knurl_heightmap *map = NULL;
             assert_int_equal(knurl_heightmap_create(context, &def, &map, NULL), KNURL_OK);
+            assert_int_equal(heightmap_need(map, HEIGHT_NEED_RMIP, NULL), KNURL_OK);
             knurl_image_release(image);
             double last = knurl_heightmap_levels(map) - 1;
             for (int32_t i = 0; i < 500; i++) {
@@ -304,6 +306,7 @@ static knurl_heightmap *make_spike(knurl_context *context, int32_t width, int32_
     def.rmip_cell = def.minmax_cell = 1;
     knurl_heightmap *map = NULL;
     assert_int_equal(knurl_heightmap_create(context, &def, &map, NULL), KNURL_OK);
+    assert_int_equal(heightmap_need(map, HEIGHT_NEED_RMIP, NULL), KNURL_OK);
     knurl_image_release(image);
     return map;
 }
@@ -411,7 +414,7 @@ static void test_windows_cover(void **state)
     for (int32_t r = 1; r <= 600; r = r < 70 ? r + 1 : r * 2 - 1) {
         const int32_t size[2] = {r, 1}, cells[2] = {1, 1};
         knurl_heightmap *map = make_map(context, size, KNURL_PIXEL_U8, cells, 1.0, 1);
-        const rmip_axis *axis = &((const rmip_table *)map->rmip)->x;
+        const rmip_axis *axis = &heightmap_rmip(map)->x;
         assert_int_equal(axis->cells, r);
         for (int32_t first = 0; first < r; first++)
             for (int32_t last = first; last < r; last++) check_windows(axis, first, last);
@@ -458,6 +461,41 @@ static void test_tightness(void **state)
     knurl_context_release(context);
 }
 
+/* Without a table the pyramid answers, and the public function makes it. */
+static void test_table_on_demand(void **state)
+{
+    (void)state;
+    knurl_context *context = make_context();
+    const int32_t size[2] = {200, 130}, cells[2] = {2, 8};
+    knurl_heightmap *map = make_map(context, size, KNURL_PIXEL_U16, cells, 1.0, 4);
+    const double at[4] = {30.5, 40.0, 52.0, 49.5};
+    knurl_range table = heightmap_bounds_texels(map, KNURL_BOUNDS_RMIP, at[0], at[1], at[2], at[3],
+                                                KNURL_WRAP_REPEAT, KNURL_WRAP_REPEAT);
+    rmip_destroy(context, map->rmip);
+    map->rmip = NULL;
+    assert_int_equal(knurl_heightmap_memory(map).rmip, 0);
+    knurl_range pyramid = heightmap_bounds_texels(map, KNURL_BOUNDS_MINMAX, at[0], at[1], at[2], at[3],
+                                                  KNURL_WRAP_REPEAT, KNURL_WRAP_REPEAT);
+    knurl_range found = heightmap_bounds_texels(map, KNURL_BOUNDS_RMIP, at[0], at[1], at[2], at[3],
+                                                KNURL_WRAP_REPEAT, KNURL_WRAP_REPEAT);
+    assert_true(found.min == pyramid.min && found.max == pyramid.max);
+    assert_true(table.min > pyramid.min || table.max < pyramid.max);
+    assert_null(heightmap_rmip(map));
+    found = knurl_heightmap_bounds(map, KNURL_BOUNDS_RMIP, (at[0] + 0.5) / size[0], (at[1] + 0.5) / size[1],
+                                   (at[2] + 0.5) / size[0], (at[3] + 0.5) / size[1], KNURL_WRAP_REPEAT,
+                                   KNURL_WRAP_REPEAT, 0.0);
+    assert_true(found.min >= pyramid.min && found.max <= pyramid.max);
+    assert_true(found.min > pyramid.min || found.max < pyramid.max);
+    const rmip_table *made = heightmap_rmip(map);
+    assert_non_null(made);
+    assert_int_equal(knurl_heightmap_memory(map).rmip, made->bytes);
+    assert_int_equal(heightmap_need(map, HEIGHT_NEED_RMIP, NULL), KNURL_OK);
+    assert_ptr_equal(heightmap_rmip(map), made);
+    knurl_heightmap_release(map);
+    assert_int_equal(knurl_context_bytes(context), 0);
+    knurl_context_release(context);
+}
+
 static void test_margin(void **state)
 {
     (void)state;
@@ -485,15 +523,11 @@ static void test_margin(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_rectangles),
-        cmocka_unit_test(test_single_spikes),
-        cmocka_unit_test(test_clamped_far_away),
-        cmocka_unit_test(test_coordinates_without_meaning),
-        cmocka_unit_test(test_rounding_is_outward),
-        cmocka_unit_test(test_exact_windows),
-        cmocka_unit_test(test_windows_cover),
-        cmocka_unit_test(test_tightness),
-        cmocka_unit_test(test_margin),
+        cmocka_unit_test(test_random_rectangles),   cmocka_unit_test(test_single_spikes),
+        cmocka_unit_test(test_clamped_far_away),    cmocka_unit_test(test_coordinates_without_meaning),
+        cmocka_unit_test(test_rounding_is_outward), cmocka_unit_test(test_exact_windows),
+        cmocka_unit_test(test_windows_cover),       cmocka_unit_test(test_tightness),
+        cmocka_unit_test(test_table_on_demand),     cmocka_unit_test(test_margin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

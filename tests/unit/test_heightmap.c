@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "bounds/blocks.h"
 #include "bounds/heightmap.h"
 #include "bounds/minmax.h"
 #include "bounds/rmip.h"
@@ -67,6 +68,7 @@ static knurl_heightmap *make_map(knurl_context *context, const knurl_image *imag
     knurl_heightmap *map = NULL;
     knurl_error error = {0};
     knurl_status status = knurl_heightmap_create(context, &def, &map, &error);
+    if (status == KNURL_OK) status = heightmap_need(map, HEIGHT_NEED_RMIP | HEIGHT_NEED_BLOCKS, &error);
     if (status != KNURL_OK) fail_msg("%s", error.message);
     return map;
 }
@@ -346,6 +348,8 @@ static void test_out_of_memory(void **state)
             knurl_heightmap *map = NULL;
             knurl_error error = {0};
             knurl_status status = knurl_heightmap_create(context, &def, &map, &error);
+            if (status == KNURL_OK) status = heightmap_need(map, HEIGHT_NEED_RMIP, &error);
+            if (status == KNURL_OK) status = heightmap_need(map, HEIGHT_NEED_BLOCKS, &error);
             knurl_heightmap_release(map);
             assert_int_equal(knurl_context_bytes(context), 0);
             knurl_context_release(context);
@@ -370,11 +374,17 @@ static void assert_same_map(const knurl_heightmap *a, const knurl_heightmap *b)
     int32_t top = p->level_count - 1;
     assert_int_equal(p->level_count, q->level_count);
     assert_memory_equal(p->codes, q->codes, (p->offset[top] + 1) * sizeof *p->codes);
-    const rmip_table *r = a->rmip, *t = b->rmip;
+    const rmip_table *r = heightmap_rmip(a), *t = heightmap_rmip(b);
     assert_int_equal(r->bytes, t->bytes);
     for (size_t row = 0; row < r->y.base[r->y.layers]; row++)
         assert_memory_equal(r->codes + row * r->stride, t->codes + row * t->stride,
                             r->x.base[r->x.layers] * sizeof *r->codes);
+    const height_blocks *d = heightmap_blocks(a), *e = heightmap_blocks(b);
+    assert_int_equal(d->bytes, e->bytes);
+    assert_memory_equal(d->tiles, e->tiles, (size_t)d->tile_columns * (size_t)d->tile_rows * 64);
+    for (int32_t k = 0; k < d->level_count; k++)
+        assert_memory_equal(d->nodes[k], e->nodes[k],
+                            (size_t)d->columns[k] * (size_t)d->rows[k] * sizeof *d->nodes[k]);
 }
 
 /* Threads and instruction sets change nothing; sizes and cells reach all tails of the kernels. */
@@ -405,6 +415,65 @@ static void test_same_on_any_machine(void **state)
     knurl_context_release(reference);
 }
 
+typedef struct demand {
+    knurl_heightmap *map;
+    pthread_t thread;
+    uint32_t what;
+    const void *found[2];
+} demand;
+
+static void *ask(void *user)
+{
+    demand *d = user;
+    if (heightmap_need(d->map, d->what, NULL) != KNURL_OK) return NULL;
+    d->found[0] = heightmap_rmip(d->map);
+    d->found[1] = heightmap_blocks(d->map);
+    return d;
+}
+
+/* Several threads ask at once while others read: one structure of each kind is made, and is counted. */
+static void test_made_on_demand(void **state)
+{
+    (void)state;
+    knurl_context *context = make_context(2, UINT32_MAX, 0);
+    knurl_image *image = make_image(context, 300, 201, 1, KNURL_PIXEL_U8, 4);
+    knurl_heightmap_def def = knurl_heightmap_def_default();
+    def.image = image;
+    knurl_heightmap *map = NULL;
+    assert_int_equal(knurl_heightmap_create(context, &def, &map, NULL), KNURL_OK);
+    knurl_image_release(image);
+    assert_null(heightmap_blocks(map));
+    assert_int_equal(knurl_heightmap_memory(map).blocks, 0);
+    double build_ms = knurl_heightmap_build_ms(map);
+    enum { ASKING = 6 };
+    demand demands[ASKING];
+    for (size_t i = 0; i < ASKING; i++) {
+        demands[i] = (demand){.map = map, .what = i % 2 ? HEIGHT_NEED_BLOCKS : HEIGHT_NEED_RMIP};
+        assert_int_equal(pthread_create(&demands[i].thread, NULL, ask, &demands[i]), 0);
+    }
+    for (int32_t i = 0; i < 1000; i++) {
+        knurl_range range = heightmap_bounds_texels(map, KNURL_BOUNDS_RMIP, i % 7, 3, 90 + i % 5, 80,
+                                                    KNURL_WRAP_REPEAT, KNURL_WRAP_CLAMP);
+        assert_true(range.min < range.max);
+        assert_true(knurl_heightmap_memory(map).minmax > 0);
+    }
+    for (size_t i = 0; i < ASKING; i++) {
+        void *result = NULL;
+        assert_int_equal(pthread_join(demands[i].thread, &result), 0);
+        assert_non_null(result);
+        assert_ptr_equal(demands[i].found[i % 2],
+                         i % 2 ? (const void *)heightmap_blocks(map) : (const void *)heightmap_rmip(map));
+    }
+    knurl_heightmap_bytes bytes = knurl_heightmap_memory(map);
+    assert_int_equal(bytes.rmip, heightmap_rmip(map)->bytes);
+    assert_int_equal(bytes.blocks, heightmap_blocks(map)->bytes);
+    assert_true(knurl_heightmap_build_ms(map) > build_ms);
+    assert_int_equal(knurl_heightmap_format(map), KNURL_PIXEL_U8);
+    knurl_heightmap_release(map);
+    assert_int_equal(knurl_context_bytes(context), 0);
+    knurl_context_release(context);
+}
+
 static void test_memory_and_owners(void **state)
 {
     (void)state;
@@ -417,7 +486,10 @@ static void test_memory_and_owners(void **state)
     knurl_heightmap_bytes bytes = knurl_heightmap_memory(map);
     uint64_t total = bytes.samples + bytes.levels + bytes.minmax + bytes.rmip;
     assert_int_equal(bytes.samples, 2u << 20);
-    assert_true(total <= 2 * bytes.samples);
+    assert_true(bytes.rmip > 0 && total <= 2 * bytes.samples);
+    /* Tiles repeat the samples, nodes add 1/8 of that and a little. */
+    assert_true(bytes.blocks > bytes.samples && bytes.blocks < bytes.samples * 5 / 4);
+    total += bytes.blocks;
     assert_true(knurl_context_bytes(other) >= total && knurl_context_bytes(other) <= total + 4096);
     assert_true(knurl_heightmap_build_ms(map) >= 0.0);
     assert_ptr_equal(knurl_heightmap_retain(map), map);
@@ -439,6 +511,7 @@ int main(void)
         cmocka_unit_test(test_texels_must_be_finite),
         cmocka_unit_test(test_out_of_memory),
         cmocka_unit_test(test_same_on_any_machine),
+        cmocka_unit_test(test_made_on_demand),
         cmocka_unit_test(test_memory_and_owners),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -247,6 +247,7 @@ const method method_empty_skip = {
     .name = "empty-skip",
     .summary = "safety zones from dilation and erosion, then samples (Kolb and Rezk-Salama 2005)",
     .flags = 0,
+    .needs = HEIGHT_NEED_RMIP,
     .parameters = PARAMETERS,
     .build = empty_skip_build,
     .intersect = empty_skip_intersect,

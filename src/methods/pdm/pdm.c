@@ -239,6 +239,7 @@ const method method_pdm = {
     .name = "pdm",
     .summary = "projective displacement mapping in parallel offset prisms (Hoetzlein 2025)",
     .flags = KNURL_METHOD_UNNORMALISED,
+    .needs = HEIGHT_NEED_RMIP,
     .parameters = PARAMETERS,
     .build = pdm_build,
     .intersect = pdm_intersect,

@@ -58,6 +58,7 @@ const method method_binary = {
     .name = "binary",
     .summary = "uniform steps, then binary search (Policarpo et al. 2005; Baboud and Decoret 2006)",
     .flags = 0,
+    .needs = HEIGHT_NEED_RMIP,
     .parameters = PARAMETERS,
     .build = binary_build,
     .intersect = binary_intersect,

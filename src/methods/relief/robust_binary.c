@@ -150,6 +150,7 @@ const method method_robust_binary = {
     .name = "robust-binary",
     .summary = "steps by precomputed safety radius, then binary search (Baboud and Decoret 2006)",
     .flags = 0,
+    .needs = HEIGHT_NEED_RMIP,
     .parameters = PARAMETERS,
     .build = robust_build,
     .intersect = robust_intersect,

@@ -31,6 +31,7 @@ const method method_texel_walk = {
     .name = "texel-walk",
     .summary = "walk over centre lines (Baboud and Decoret 2006); exact on planes, boxes and frusta",
     .flags = 0,
+    .needs = HEIGHT_NEED_RMIP,
     .parameters = PARAMETERS,
     .intersect = texel_walk_intersect,
 };

@@ -181,6 +181,7 @@ const method method_rmip = {
     .name = "rmip",
     .summary = "inversion and oblong bounds (Thonat et al. 2023); exact",
     .flags = KNURL_METHOD_EXACT,
+    .needs = HEIGHT_NEED_RMIP,
     .parameters = PARAMETERS,
     .build = rmip_build,
     .intersect = rmip_intersect,

@@ -98,6 +98,7 @@ const method method_secant = {
     .name = "secant",
     .summary = "uniform samples and one secant step (Yerex and Jagersand 2004)",
     .flags = 0,
+    .needs = HEIGHT_NEED_RMIP,
     .parameters = PARAMETERS,
     .build = secant_build,
     .intersect = secant_intersect,

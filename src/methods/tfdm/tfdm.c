@@ -41,13 +41,9 @@ typedef struct tfdm_data {
 
 static knurl_status build_pyramid(const shell_space *space, tfdm_data *data, knurl_error *error)
 {
-    cell_grid grid;
-    cell_scale scale;
+    cell_scale scale = heightmap_scale(space->map); /* what the bounds are decoded with */
     knurl_status status =
-        cell_grid_build(space->context, &space->map->levels[0], data->leaf_level, &grid, &scale, error);
-    if (status != KNURL_OK) return status;
-    status = minmax_build(space->context, &grid, &data->own, error);
-    knurl_free(space->context, grid.codes);
+        minmax_build(space->context, &space->map->levels[0], data->leaf_level, &scale, &data->own, error);
     data->pyramid = data->own;
     return status;
 }
@@ -68,6 +64,17 @@ static void tfdm_destroy(const shell_space *space, void *data)
 {
     minmax_destroy(space->context, ((tfdm_data *)data)->own);
     knurl_free(space->context, data);
+}
+
+static knurl_status tfdm_update(const shell_space *space, const method_edit *edit, void *data, bool *rebuild,
+                                knurl_error *error)
+{
+    (void)rebuild;
+    (void)error;
+    const tfdm_data *tfdm = data;
+    cell_scale scale = heightmap_scale(space->map);
+    if (tfdm->own) minmax_update(space->context, tfdm->own, &space->map->levels[0], &scale, edit->samples);
+    return KNURL_OK;
 }
 
 static uint64_t tfdm_bytes(const void *data)
@@ -187,6 +194,7 @@ const method method_tfdm = {
     .flags = KNURL_METHOD_EXACT,
     .parameters = PARAMETERS,
     .build = tfdm_build,
+    .update = tfdm_update,
     .intersect = tfdm_intersect,
     .bytes = tfdm_bytes,
     .destroy = tfdm_destroy,
