@@ -209,7 +209,9 @@ int bake_command(int argc, char **argv)
     if (code == CODE_DONE) code = output_check(&session, options.out);
     loaded_scene loaded = {0};
     method_options method = method_options_default();
-    method.rmip_cell = 32; /* no ray is traced */
+    /* No ray is traced: what is made soonest. */
+    method.method = "rmip";
+    method.rmip_cell = 32;
     if (code == CODE_DONE)
         code = scene_load(&session, options.scene, &options.displacement, &method, &loaded);
     if (code == CODE_DONE) code = bake_loaded(&session, &options, &loaded);

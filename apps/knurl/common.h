@@ -15,10 +15,12 @@ typedef struct general_options {
     bool quiet, verbose;
 } general_options;
 
-/* How the surface is traced. Parse with method_argp. */
+/* How the surface is traced. Parse with method_argp; not to be copied after that. */
 typedef struct method_options {
-    const char *method; /* with its parameters; NULL: the library's default */
+    const char *method; /* with its parameters; NULL: the library's default. May point to `budgeted` */
     int rmip_cell;      /* 0: the library's default */
+    double budget;      /* MiB, of --accel-budget; NaN: not given */
+    char budgeted[256]; /* the method with that as a parameter */
 } method_options;
 
 /* Displacement given on the command line. Parse with displacement_argp. */

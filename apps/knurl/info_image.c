@@ -108,6 +108,14 @@ static int measure(command_session *session, const knurl_heightmap_def *def, jso
 
 /* ---- the map ---- */
 
+/* Facets of a tiled map are told as an estimate, and not made. */
+static bool is_not_facets(const char *method)
+{
+    int32_t index = 0;
+    return method && knurl_method_check(method, &index, NULL) == KNURL_OK &&
+           !(knurl_method_flags(index) & KNURL_METHOD_NATIVE);
+}
+
 /* The map on a unit square, tiled: what a surface that uses it costs. */
 static knurl_status measure_use(command_session *session, knurl_heightmap *map, const info_options *options,
                                 knurl_surface_info *info, knurl_error *error)
@@ -117,6 +125,7 @@ static knurl_status measure_use(command_session *session, knurl_heightmap *map, 
     static const float texcoords[8] = {0, 0, 1, 0, 1, 1, 0, 1};
     static const uint32_t triangles[6] = {0, 2, 1, 0, 3, 2};
     knurl_surface_def def = knurl_surface_def_default();
+    if (is_not_facets(options->method.method)) def.method = options->method.method;
     def.mesh = (knurl_mesh_view){positions, normals, texcoords, 4, triangles, 2, NULL};
     def.displacement = knurl_displacement_default();
     def.displacement.map = map;
@@ -207,15 +216,18 @@ static void print_map(const json_t *map)
 {
     const json_t *bytes = json_object_get(map, "bytes"), *tiled = json_object_get(map, "tiled");
     const json_t *range = json_object_get(map, "range");
-    static const char *const keys[] = {"samples", "levels", "minmax", "rmip", "total"};
-    static const char *const meanings[] = {"level 0", "coarser levels of detail", "min-max pyramid",
-                                           "RMIP table", ""};
+    static const char *const keys[] = {"samples", "levels", "minmax", "rmip", "blocks", "total"};
+    static const char *const meanings[] = {
+        "level 0",    "coarser levels of detail",           "min-max pyramid",
+        "RMIP table", "tiles of samples with their bounds", ""};
     char text[32], other[32];
     printf("as a height map (red channel): %d levels, values %g to %g, bounds built in %.2f ms\n",
            (int)info_number(map, "levels"), json_number_value(json_array_get(range, 0)),
            json_number_value(json_array_get(range, 1)), info_number(map, "build_ms"));
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++)
-        printf("  %-8s %12s  %s\n", keys[i], format_bytes(text, info_number(bytes, keys[i])), meanings[i]);
+        if (info_number(bytes, keys[i]) > 0) /* not what only other methods use */
+            printf("  %-8s %12s  %s\n", keys[i], format_bytes(text, info_number(bytes, keys[i])),
+                   meanings[i]);
     printf("tiled %g x %g on a square: %s texels in %s; tessellated at one vertex per texel: %s\n",
            info_number(tiled, "u"), info_number(tiled, "v"),
            info_count_text((char[32]){0}, info_number(tiled, "texels")),

@@ -201,7 +201,7 @@ static void print_objects(const json_t *root)
 static void print_memory(const json_t *root)
 {
     static const char *const keys[] = {"mesh", "shells", "maps", "bvh", "total"};
-    static const char *const meanings[] = {"vertices and indices", "per base triangle",
+    static const char *const meanings[] = {"vertices and indices", "what the method keeps",
                                            "height maps with levels and bounds", "Embree", "all of it"};
     const json_t *bytes = json_object_get(root, "bytes");
     char text[32], whole[32];

@@ -10,6 +10,7 @@ enum {
     KEY_THREADS = 0x100,
     KEY_MEMORY_LIMIT,
     KEY_METHOD,
+    KEY_ACCEL_BUDGET,
     KEY_RMIP_CELL,
     KEY_DISP,
     KEY_DISP_FACTOR,
@@ -76,7 +77,7 @@ void take_scene(struct argp_state *state, const char *argument, const char **sce
 
 method_options method_options_default(void)
 {
-    return (method_options){0};
+    return (method_options){.budget = NAN};
 }
 
 static void check_method(struct argp_state *state, const char *specification)
@@ -92,6 +93,32 @@ static void check_method(struct argp_state *state, const char *specification)
     argp_error(state, "--method: %s; methods are %s", error.message, list);
 }
 
+/* MiB. Zero is a size here. */
+static double parse_budget(struct argp_state *state, const char *text)
+{
+    uint64_t bytes = strcmp(text, "0") == 0 ? 0 : value_size(state, "--accel-budget", text);
+    if (bytes > UINT64_C(1) << 40) argp_error(state, "--accel-budget: found '%s', expected 1T at most", text);
+    return (double)bytes / 1048576.0;
+}
+
+/* Adds --accel-budget to the method's parameters. */
+static void take_budget(struct argp_state *state, method_options *options)
+{
+    if (isnan(options->budget)) return;
+    const char *method = options->method ? options->method : knurl_surface_def_default().method;
+    size_t name = strcspn(method, ":");
+    if (name != 4 || strncmp(method, "fast", name) != 0)
+        argp_error(state, "--accel-budget: found with --method %s, expected method fast", method);
+    if (strstr(method + name, ":budget="))
+        argp_error(state, "--accel-budget: found beside --method %s, expected one budget", method);
+    int length =
+        snprintf(options->budgeted, sizeof options->budgeted, "%s:budget=%.17g", method, options->budget);
+    if (length < 0 || (size_t)length >= sizeof options->budgeted)
+        argp_error(state, "--method: found %zu characters, expected under %zu with --accel-budget",
+                   strlen(method), sizeof options->budgeted - 32);
+    options->method = options->budgeted;
+}
+
 static error_t parse_method(int key, char *argument, struct argp_state *state)
 {
     method_options *options = state->input;
@@ -100,12 +127,18 @@ static error_t parse_method(int key, char *argument, struct argp_state *state)
         check_method(state, argument);
         options->method = argument;
         break;
+    case KEY_ACCEL_BUDGET:
+        options->budget = parse_budget(state, argument);
+        break;
     case KEY_RMIP_CELL: {
         options->rmip_cell = (int)value_integer(state, "--rmip-cell", argument, 1, 32);
         if (options->rmip_cell & (options->rmip_cell - 1))
             argp_error(state, "--rmip-cell: found '%s', expected 1, 2, 4, 8, 16 or 32", argument);
         break;
     }
+    case ARGP_KEY_END:
+        take_budget(state, options);
+        break;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -114,11 +147,16 @@ static error_t parse_method(int key, char *argument, struct argp_state *state)
 
 static const struct argp_option method_list[] = {
     {"method", KEY_METHOD, "NAME[:PARAMETER=VALUE...]", 0,
-     "How rays meet the surface, e.g. rmip:marching-scale=4; `knurl methods' lists methods and parameters",
+     "How rays meet the surface, e.g. rmip:marching-scale=4; default fast; `knurl methods' lists methods and "
+     "parameters",
+     0},
+    {"accel-budget", KEY_ACCEL_BUDGET, "SIZE", 0,
+     "Method fast: bytes for its hierarchy over each surface, e.g. 64M; 0: base triangles only, smallest and "
+     "slowest. Default: as many as the map's samples",
      0},
     {"rmip-cell", KEY_RMIP_CELL, "N", 0,
-     "Texels per side of a cell of the RMIP table: 1 to 32, a power of two (default 8). Larger is smaller "
-     "and slower",
+     "Method rmip: texels per side of a cell of its table: 1 to 32, a power of two (default 8). Larger is "
+     "smaller and slower",
      0},
     {0}};
 

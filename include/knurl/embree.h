@@ -5,9 +5,11 @@
  *
  *     unsigned int id = knurl_embree_attach(device, scene, surface);  // then rtcCommitScene(scene)
  *
- * One Embree primitive is one base triangle. A hit has the fields of an Embree triangle's: tfar,
- * u and v (the barycentrics of vertices 1 and 2), Ng (here of unit length), primID, geomID, instID.
- * Rays may come alone, in packets or streams; masks, filter functions and instancing work as usual. */
+ * A surface is a user geometry of knurl_surface_shell_count() primitives: one in all with `fast`, the default
+ * method, which has a hierarchy of its own (KNURL_METHOD_WHOLE), else one per base triangle. A hit has the
+ * fields of an Embree triangle's either way: tfar, u and v (the barycentrics of vertices 1 and 2), Ng (here
+ * of unit length), primID (the base triangle), geomID, instID. Rays may come alone, in packets or streams;
+ * masks, filter functions and instancing work as usual. */
 #ifndef KNURL_EMBREE_H
 #define KNURL_EMBREE_H
 
@@ -109,8 +111,8 @@ typedef struct knurl_embree_context {
      * surface (an instance's own space). Rays with an id from hit_count on get none. */
     knurl_hit *hits;
     uint32_t hit_count;
-    /* As in knurl_ray, for all rays of the query; default 0. A callback sees one shell and not where
-     * the ray enters the object, so the width is taken at the ray parameter cone_distance. */
+    /* As in knurl_ray, for all rays of the query; default 0. A callback is not told where the ray enters the
+     * object, so the width is taken at the ray parameter cone_distance. */
     float lod;
     float cone_width, cone_spread;
     float cone_distance;
@@ -294,7 +296,7 @@ static inline bool knurl_embree_occluded_ray(const struct RTCOccludedFunctionNAr
     const knurl_surface *surface = (const knurl_surface *)args->geometryUserPtr;
     struct RTCRay ray = knurl_embree_get_ray(args->ray, args->N, i);
     knurl_ray segment = knurl_embree_to_ray(&ray, surface, extended);
-    /* The common case, nothing in this shell, needs no full hit and no filter. */
+    /* The common case, nothing in the way, needs no full hit and no filter. */
     if (!knurl_surface_occluded(surface, args->primID, &segment)) return false;
     bool refused = false;
     knurl_hit full;
@@ -413,7 +415,8 @@ static inline bool knurl_embree_hit(const knurl_surface *surface, const struct R
     const float below = nextafterf(nextafterf(rayhit->ray.tfar, -INFINITY), -INFINITY);
     if ((double)below > ray.tmin) ray.tmin = (double)below;
     ray.tmax = (double)nextafterf(rayhit->ray.tfar, INFINITY);
-    return knurl_surface_intersect(surface, rayhit->hit.primID, &ray, hit);
+    const bool whole = (knurl_surface_flags(surface) & KNURL_METHOD_WHOLE) != 0;
+    return knurl_surface_intersect(surface, whole ? 0 : rayhit->hit.primID, &ray, hit);
 }
 
 #ifdef __cplusplus

@@ -93,7 +93,8 @@ typedef struct knurl_surface_def {
     knurl_mesh_view mesh;
     knurl_displacement displacement;
     const char *method; /* an intersection method, with parameters if wanted, each after a colon:
-                           "rmip" (default), "rmip:marching-scale=4:bounds=minmax" */
+                           "fast" (default, and for NULL), "fast:budget=64",
+                           "rmip:marching-scale=4:bounds=minmax" */
 } knurl_surface_def;
 
 KNURL_API knurl_surface_def knurl_surface_def_default(void);
@@ -145,7 +146,7 @@ typedef struct knurl_surface_info {
     double lower[3], upper[3];     /* bounds of all shells */
     double texels;                 /* texels covered by the mesh, tiling included */
     uint64_t mesh_bytes;           /* vertex and index data */
-    uint64_t shell_bytes;          /* per-triangle data of the method */
+    uint64_t shell_bytes;          /* shells and the method's own data */
     uint64_t map_bytes;            /* the map with all its structures (shared with other surfaces) */
     uint64_t tessellated_bytes;    /* estimate for Embree triangles, one vertex per texel */
 } knurl_surface_info;

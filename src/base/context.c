@@ -186,8 +186,10 @@ uint32_t knurl_cpu_features(const knurl_context *context)
 #if defined(__x86_64__)
     __builtin_cpu_init();
     if (__builtin_cpu_supports("sse4.1")) found |= KNURL_CPU_SSE41;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) found |= KNURL_CPU_AVX2;
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+        __builtin_cpu_supports("bmi2"))
+        found |= KNURL_CPU_AVX2;
+    if (found & KNURL_CPU_AVX2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
         __builtin_cpu_supports("avx512vl"))
         found |= KNURL_CPU_AVX512;
 #endif

@@ -16,7 +16,7 @@ knurl_displacement knurl_displacement_default(void)
 knurl_surface_def knurl_surface_def_default(void)
 {
     return (knurl_surface_def){
-        .cookie = KNURL_COOKIE, .displacement = knurl_displacement_default(), .method = "rmip"};
+        .cookie = KNURL_COOKIE, .displacement = knurl_displacement_default(), .method = "fast"};
 }
 
 knurl_ray knurl_ray_make(const double origin[3], const double direction[3])
@@ -197,7 +197,7 @@ knurl_status knurl_surface_create(knurl_context *context, const knurl_surface_de
                           "surface definition was not made by knurl_surface_def_default()");
     const method *found = NULL;
     double values[METHOD_MAX_PARAMETERS];
-    knurl_status status = method_parse(def->method ? def->method : "rmip", &found, values, error);
+    knurl_status status = method_parse(def->method ? def->method : "fast", &found, values, error);
     if (status == KNURL_OK) status = check_displacement(&def->displacement, error);
     if (status != KNURL_OK) return status;
     knurl_surface *made = knurl_alloc_zero(context, sizeof *made);

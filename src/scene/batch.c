@@ -80,7 +80,7 @@ static void trace_chunk(void *user, size_t begin, size_t end, int32_t thread)
 }
 
 /* Rays are put in order by stretches, so that what is done when a caller stops is a good part. */
-enum { ORDERED_LEAST = 4 * KNURL_BATCH_BLOCK, ORDERED_MOST = 256 * KNURL_BATCH_BLOCK };
+enum { ORDERED_LEAST = 2 * KNURL_BATCH_BLOCK, ORDERED_MOST = 256 * KNURL_BATCH_BLOCK };
 
 /* Worth it for surfaces with hierarchies of their own: other objects hand rays to Embree one by one. */
 static bool gains_from_order(const knurl_scene *scene)

@@ -66,6 +66,13 @@ static inline bool scene_prepare(const knurl_scene *scene, uint32_t number, cons
     if (!(instance->mask & ray->mask)) return false;
     *local = *ray;
     if (!instance->identity) scene_instance_move_ray(instance, local);
+    const accel_object *object = &scene->objects[instance->object];
+    if (scene->instance_count == 1 && object->whole && !(ray->cone_width > 0.0f || ray->cone_spread > 0.0f)) {
+        /* Nothing to put in order: the surface clips rays to its bounds itself. */
+        segment->t0 = ray->tmin;
+        segment->t1 = ray->tmax;
+        return true;
+    }
     return accel_object_prepare(&scene->objects[instance->object], local, segment);
 }
 

@@ -16,6 +16,7 @@
 enum { ROWS = 8, COLUMNS = 12, RAYS = 4000 };
 
 typedef struct fixture {
+    const char *method;
     knurl_context *context;
     knurl_surface *surface;
     knurl_scene *scene; /* object 0: the sphere, object 1: the floor */
@@ -27,7 +28,7 @@ typedef struct fixture {
 static const float floor_positions[12] = {-3, -1.2f, -3, 3, -1.2f, -3, 3, -1.2f, 3, -3, -1.2f, 3};
 static const uint32_t floor_triangles[6] = {0, 2, 1, 0, 3, 2};
 
-static knurl_surface *make_sphere(knurl_context *context)
+static knurl_surface *make_sphere(knurl_context *context, const char *method)
 {
     static float positions[(ROWS + 1) * (COLUMNS + 1) * 3], texcoords[(ROWS + 1) * (COLUMNS + 1) * 2];
     static uint32_t triangles[ROWS * COLUMNS * 6];
@@ -55,6 +56,7 @@ static knurl_surface *make_sphere(knurl_context *context)
     knurl_heightmap_def map_def = knurl_heightmap_def_default();
     map_def.image = image;
     knurl_surface_def def = knurl_surface_def_default();
+    def.method = method;
     assert_int_equal(knurl_heightmap_create(context, &map_def, &def.displacement.map, NULL), KNURL_OK);
     def.displacement.factor = 0.15;
     def.mesh = (knurl_mesh_view){.positions = positions,
@@ -84,14 +86,15 @@ static unsigned int attach_floor(RTCDevice device, RTCScene scene)
     return id;
 }
 
-static int setup(void **state)
+static int setup_method(void **state, const char *method)
 {
     fixture *f = calloc(1, sizeof *f);
     if (!f) return -1;
+    f->method = method;
     knurl_context_def def = knurl_context_def_default();
     def.threads = 1;
     assert_int_equal(knurl_context_create(&def, &f->context, NULL), KNURL_OK);
-    f->surface = make_sphere(f->context);
+    f->surface = make_sphere(f->context, method);
     knurl_mesh_view floor = {
         .positions = floor_positions, .vertex_count = 4, .triangles = floor_triangles, .triangle_count = 2};
     assert_int_equal(knurl_scene_create(f->context, &f->scene, NULL), KNURL_OK);
@@ -113,6 +116,17 @@ static int setup(void **state)
     assert_int_equal(rtcGetDeviceError(f->device), RTC_ERROR_NONE);
     *state = f;
     return 0;
+}
+
+/* A surface with a hierarchy of its own, one primitive; and one of a primitive per triangle. */
+static int setup_fast(void **state)
+{
+    return setup_method(state, "fast");
+}
+
+static int setup_rmip(void **state)
+{
+    return setup_method(state, "rmip");
 }
 
 static int teardown(void **state)
@@ -197,6 +211,28 @@ static void assert_agrees(const fixture *f, const struct RTCRayHit *rayhit, cons
 }
 
 /* ---- Tests ---------------------------------------------------------------------------------- */
+
+/* primID is the base triangle also where Embree knows of one primitive only. */
+static void test_primitives(void **state)
+{
+    const fixture *f = *state;
+    const bool whole = (knurl_surface_flags(f->surface) & KNURL_METHOD_WHOLE) != 0;
+    assert_int_equal(whole, strcmp(f->method, "fast") == 0);
+    assert_int_equal(knurl_surface_shell_count(f->surface), whole ? 1 : 2 * ROWS * COLUMNS);
+    bool seen[2 * ROWS * COLUMNS] = {false};
+    random_state random = {15};
+    int count = 0;
+    for (int i = 0; i < RAYS; i++) {
+        struct RTCRay ray = random_ray(&random);
+        struct RTCRayHit rayhit = start(&ray);
+        knurl_embree_intersect1(f->plain, NULL, &rayhit);
+        if (rayhit.hit.geomID != f->sphere) continue;
+        assert_true(rayhit.hit.primID < 2 * ROWS * COLUMNS);
+        count += !seen[rayhit.hit.primID];
+        seen[rayhit.hit.primID] = true;
+    }
+    assert_true(count > ROWS * COLUMNS);
+}
 
 static void test_same_hits_as_scene(void **state)
 {
@@ -453,6 +489,7 @@ static void test_instancing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_primitives),
         cmocka_unit_test(test_same_hits_as_scene),
         cmocka_unit_test(test_extended_context),
         cmocka_unit_test(test_cone),
@@ -463,5 +500,6 @@ int main(void)
         cmocka_unit_test(test_masks),
         cmocka_unit_test(test_instancing),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    int failed = cmocka_run_group_tests_name("fast", tests, setup_fast, teardown);
+    return failed + cmocka_run_group_tests_name("rmip", tests, setup_rmip, teardown);
 }

@@ -52,12 +52,13 @@ static void make_grid(float *positions, float *texcoords, uint32_t *triangles, k
 }
 
 /* One mesh, one displaced surface of the same grid, and seven instances of the two. */
-static knurl_scene *new_scene(knurl_context *context)
+static knurl_scene *new_scene(knurl_context *context, const char *method)
 {
     static float positions[(GRID + 1) * (GRID + 1) * 3], texcoords[(GRID + 1) * (GRID + 1) * 2];
     static uint32_t triangles[GRID * GRID * 6];
     knurl_scene *scene;
     knurl_surface_def def = knurl_surface_def_default();
+    def.method = method;
     make_grid(positions, texcoords, triangles, &def.mesh);
     uint8_t samples[16 * 16];
     random_state random = {5};
@@ -128,9 +129,8 @@ static void assert_same_hit(const knurl_hit *a, const knurl_hit *b)
     assert_memory_equal(&a->error, &b->error, sizeof a->error);
 }
 
-static void test_batch_equals_single_for_any_threads(void **state)
+static void compare_batches(const char *method)
 {
-    (void)state;
     knurl_ray *rays = new_rays();
     knurl_hit *hits = malloc(RAYS * sizeof *hits), *first = malloc(RAYS * sizeof *first);
     uint8_t *occluded = malloc(RAYS);
@@ -138,7 +138,7 @@ static void test_batch_equals_single_for_any_threads(void **state)
     const int32_t threads[] = {1, 2, 7};
     for (int run = 0; run < 3; run++) {
         knurl_context *context = new_context(threads[run]);
-        knurl_scene *scene = new_scene(context);
+        knurl_scene *scene = new_scene(context, method);
         size_t done = 0;
         assert_int_equal(knurl_scene_intersect_batch(scene, rays, RAYS, hits, NULL, NULL, &done, NULL),
                          KNURL_OK);
@@ -170,6 +170,13 @@ static void test_batch_equals_single_for_any_threads(void **state)
     free(occluded);
 }
 
+static void test_batch_equals_single_for_any_threads(void **state)
+{
+    (void)state;
+    compare_batches("fast");
+    compare_batches("rmip");
+}
+
 typedef struct stopper {
     double last;
     double stop_at;
@@ -193,7 +200,7 @@ static void test_progress_and_stopping(void **state)
     knurl_hit *hits = malloc(RAYS * sizeof *hits);
     assert_non_null(hits);
     knurl_context *context = new_context(3);
-    knurl_scene *scene = new_scene(context);
+    knurl_scene *scene = new_scene(context, "fast");
     stopper s = {.stop_at = 2.0};
     assert_int_equal(knurl_scene_intersect_batch(scene, rays, RAYS, hits, on_progress, &s, NULL, NULL),
                      KNURL_OK);
@@ -225,7 +232,7 @@ static void test_memory(void **state)
 {
     (void)state;
     knurl_context *context = new_context(1);
-    knurl_scene *scene = new_scene(context);
+    knurl_scene *scene = new_scene(context, "rmip"); /* shells in a hierarchy of Embree's */
     knurl_scene_memory memory = knurl_scene_get_memory(scene);
     knurl_surface_info info;
     knurl_surface_get_info(knurl_scene_surface(scene, 1), &info);

@@ -17,7 +17,7 @@ enum { SIDE = 4, RAYS = 3000 };
 /* 3 x 3 part stretched, turned and mirrored; far away. */
 static const double placement[12] = {-1.5, 0.4, 0.2, 900, 0.3, 2.0, -0.5, -700, 0.1, 0.3, 0.8, 1300};
 
-static knurl_surface *make_surface(knurl_context *context)
+static knurl_surface *make_surface(knurl_context *context, const char *method)
 {
     static float positions[(SIDE + 1) * (SIDE + 1) * 3], texcoords[(SIDE + 1) * (SIDE + 1) * 2];
     static uint32_t triangles[SIDE * SIDE * 6];
@@ -44,6 +44,7 @@ static knurl_surface *make_surface(knurl_context *context)
     knurl_heightmap_def map_def = knurl_heightmap_def_default();
     map_def.image = image;
     knurl_surface_def def = knurl_surface_def_default();
+    def.method = method;
     assert_int_equal(knurl_heightmap_create(context, &map_def, &def.displacement.map, NULL), KNURL_OK);
     def.displacement.factor = 0.2;
     def.mesh = (knurl_mesh_view){.positions = positions,
@@ -137,13 +138,13 @@ static void check_hit(const knurl_hit *hit, const knurl_hit *local)
     assert_true(fabs(hit->height - local->height) < 1e-9);
 }
 
-static void trace_all(uint32_t instances, float cone_width)
+static void trace_method(const char *method, uint32_t instances, float cone_width)
 {
     knurl_context *context;
     knurl_context_def def = knurl_context_def_default();
     def.threads = 1;
     assert_int_equal(knurl_context_create(&def, &context, NULL), KNURL_OK);
-    knurl_surface *surface = make_surface(context);
+    knurl_surface *surface = make_surface(context, method);
     knurl_scene *scene;
     assert_int_equal(knurl_scene_create(context, &scene, NULL), KNURL_OK);
     assert_int_equal(knurl_scene_add_surface(scene, surface, NULL, NULL), KNURL_OK);
@@ -174,6 +175,13 @@ static void trace_all(uint32_t instances, float cone_width)
     knurl_surface_release(surface);
     assert_true(knurl_context_bytes(context) == 0);
     knurl_context_release(context);
+}
+
+/* One shell in all, and one for each triangle. */
+static void trace_all(uint32_t instances, float cone_width)
+{
+    trace_method("fast", instances, cone_width);
+    trace_method("rmip", instances, cone_width);
 }
 
 static void test_one_instance(void **state)

@@ -358,6 +358,24 @@ static void methods_refuse_bad_parameters(void **state)
     assert_null(knurl_method_name(-1));
 }
 
+/* Who names no method, and who gives NULL, gets `fast`. */
+static void fast_is_the_default(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"fast", NULL, "rmip"};
+    static const float up[9] = {0, 1, 0, 0, 1, 0, 0, 1, 0};
+    assert_string_equal(knurl_surface_def_default().method, "fast");
+    knurl_context *context = make_context();
+    for (int i = 0; i < 3; i++) {
+        knurl_surface_def def = triangle_def(up, random_map(context, 8), 0.1);
+        def.method = names[i];
+        knurl_surface *surface = create(context, &def);
+        assert_int_equal((knurl_surface_flags(surface) & KNURL_METHOD_WHOLE) != 0, i < 2);
+        knurl_surface_release(surface);
+    }
+    knurl_context_release(context);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -365,7 +383,7 @@ int main(void)
         cmocka_unit_test(huge_heights_are_refused),      cmocka_unit_test(fine_texels_end),
         cmocka_unit_test(seams_know_wrapping),           cmocka_unit_test(directions_make_a_frustum),
         cmocka_unit_test(methods_refuse_bad_parameters), cmocka_unit_test(hits_do_not_depend_on_tmax),
-        cmocka_unit_test(far_origins_change_nothing),
+        cmocka_unit_test(far_origins_change_nothing),    cmocka_unit_test(fast_is_the_default),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

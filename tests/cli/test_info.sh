@@ -17,8 +17,16 @@ assert info["channel_ranges"][0]["min"] == 0 and info["channel_ranges"][0]["max"
 assert list(info["map"]) == ["levels", "range", "bytes", "build_ms", "tiled"]
 assert list(info["map"]["bytes"]) == ["samples", "levels", "minmax", "rmip", "blocks", "total"]
 assert info["map"]["levels"] == 3 and info["map"]["range"] == [0, 1]
+assert info["map"]["bytes"]["rmip"] == 0 < info["map"]["bytes"]["blocks"], info["map"]["bytes"]
 assert info["timing"]["copied_bytes"] == 8 and info["timing"]["bounds_ms"] >= 0
 PY
+
+# The structures are those of the method.
+expect 0 "$knurl" info map.pgm
+expect_text stdout.txt "tiles of samples"
+expect 0 "$knurl" info map.pgm --method rmip
+expect_text stdout.txt "RMIP table"
+! grep -q "tiles of samples" stdout.txt || fail "rmip has tiles"
 
 # Tiling multiplies the texels and the tessellation, and costs nothing.
 "$python" -c '
@@ -54,7 +62,7 @@ import json
 info = json.load(open("stdout.txt"))
 assert list(info) == ["knurl", "kind", "path", "method", "lower", "upper", "instances", "materials", "objects",
                       "textures", "cameras", "lights", "warnings", "bytes", "tessellated_bytes", "timing"], list(info)
-assert info["kind"] == "scene" and info["method"] == "rmip" and info["instances"] == 1
+assert info["kind"] == "scene" and info["method"] == "fast" and info["instances"] == 1
 box = info["objects"][0]
 assert list(box) == ["name", "displaced", "triangles", "texels", "folded", "flat_uv", "degenerate",
                      "replaced_normals", "seam_edges", "height_min", "height_max", "lower", "upper",
@@ -68,6 +76,22 @@ assert info["textures"][0]["width"] == 300 and info["textures"][0]["bits"] == 8
 assert info["bytes"]["total"] == sum(info["bytes"][k] for k in ["mesh", "shells", "maps", "bvh"])
 assert info["tessellated_bytes"] > 20 * info["bytes"]["maps"]
 PY
+
+# A budget for the method's hierarchy.
+shells() {
+    expect 0 "$knurl" info plane.obj --disp noise.pgm --disp-factor 0.1 --json "$@"
+    "$python" -c 'import json; i = json.load(open("stdout.txt")); print(i["method"], i["bytes"]["shells"])'
+}
+read -r _ usual < <(shells)
+read -r method most < <(shells --accel-budget 64M)
+[ "$method" = "fast:budget=64" ] || fail "method $method with a budget of 64M"
+read -r method none < <(shells --accel-budget 0 --method fast)
+[ "$method" = "fast:budget=0" ] || fail "method $method with a budget of 0"
+read -r method some < <(shells --method fast --accel-budget 8K)
+[ "$method" = "fast:budget=0.0078125" ] || fail "method $method with a budget of 8K"
+[ "$none" -le "$some" ] && [ "$some" -lt "$usual" ] && [ "$usual" -le "$most" ] && [ "$none" -lt 4096 ] ||
+    fail "bytes of shells: $none, $some, $usual, $most with budgets of 0, 8K, as usual and 64M"
+
 expect 0 "$knurl" info plane.obj --json
 "$python" -c 'import json; o = json.load(open("stdout.txt"))["objects"]; assert o == [{"name": o[0]["name"], "displaced": False, "triangles": 2}], o'
 

@@ -66,7 +66,7 @@ keys = ["knurl", "scene", "output", "method", "width", "height", "samples", "sam
 assert list(stats) == keys, list(stats)
 assert stats["width"] == 48 and stats["height"] == 32 and stats["samples"] == 2 and stats["samples_done"] == 2
 assert stats["rays"]["primary"] == 48 * 32 * 2, stats["rays"]
-assert stats["interrupted"] is False and stats["method"] == "rmip" and stats["bytes"]["maps"] > 0
+assert stats["interrupted"] is False and stats["method"] == "fast" and stats["bytes"]["maps"] > 0
 PY
 expect 0 "$knurl" render plane.obj -o stats.png $small --stats - -q
 "$python" -m json.tool <stdout.txt >/dev/null

@@ -24,7 +24,7 @@ for command in render trace info compare bench; do
     [ "$(wc -L <stdout.txt)" -le 80 ] || fail "help of $command is wider than 80 columns"
 done
 expect 0 "$knurl" methods
-expect_text stdout.txt "* rmip"
+expect_text stdout.txt "* fast"
 
 # Commands
 expect 2 "$knurl"
@@ -59,6 +59,14 @@ expect_error 2 "--tile: found '4', expected two numbers such as 4x4" "$knurl" re
 expect_error 2 "--tile: found '4x0', expected numbers other than zero" "$knurl" render plane.obj -o a.png --tile 4x0
 expect_error 2 "--wrap: found 'wave', expected one of repeat, mirror, clamp" "$knurl" render plane.obj -o a.png --wrap wave
 expect_error 2 "--rmip-cell: found '12', expected 1, 2, 4, 8, 16 or 32" "$knurl" render plane.obj -o a.png --rmip-cell 12
+for command in render trace info capture; do
+    "$knurl" $command --help >stdout.txt
+    expect_text stdout.txt "--accel-budget=SIZE"
+done
+expect_error 2 "--accel-budget: found '2X', expected bytes such as 500M" "$knurl" render plane.obj -o a.png --accel-budget 2X
+expect_error 2 "--accel-budget: found '2T', expected 1T at most" "$knurl" info plane.obj --accel-budget 2T
+expect_error 2 "--accel-budget: found with --method rmip:bounds=minmax, expected method fast" "$knurl" trace plane.obj --rays a --out b --accel-budget 1M --method rmip:bounds=minmax
+expect_error 2 "--accel-budget: found beside --method fast:budget=3, expected one budget" "$knurl" render plane.obj -o a.png --method fast:budget=3 --accel-budget 1M
 expect_error 2 "method parameter bounds: found 'boxes', expected one of minmax|rmip" "$knurl" render plane.obj -o a.png --method rmip:bounds=boxes
 expect_error 2 "method rmip: found 'speed=9', expected PARAMETER=VALUE" "$knurl" render plane.obj -o a.png --method rmip:speed=9
 expect_error 2 "marching-scale: found '0', expected a number from 1 to 4096" "$knurl" render plane.obj -o a.png --method rmip:marching-scale=0

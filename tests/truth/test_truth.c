@@ -3,7 +3,7 @@
  * KNURL_TRUTH_SCALE (default 0.02) scales the number of rays: 1 is 2 million rays of each method's default
  * parameters and a quarter of that for each variant. Missed and false hits must be zero; answers that only
  * rounding decides are counted and capped. Lines "scene,origin,direction,tmin,tmax" in the output can be
- * added to regressions.csv as they are. */
+ * added to regressions.csv as they are. KNURL_TRUTH_SCENE and KNURL_TRUTH_METHOD: only that one. */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>

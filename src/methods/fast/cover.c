@@ -1,6 +1,7 @@
 /* Base triangles covered by parts: nodes of the map's blocks, where they lie in the triangle. */
 #include "methods/fast/fast.h"
 
+#include <stdatomic.h>
 #include <string.h>
 
 /* Padding of boxes, in the trees' space: see accel/bvh.c, whose rays have the same errors. */
@@ -9,6 +10,8 @@ static const double BOX_PAD = 0x1p-19;
 static const double PART_BYTES = (double)sizeof(fast_part) + 45.0;
 /* Texels of a part that is reached through the wrap mode; and the most of them that a triangle may have. */
 enum { WRAPPED_SIDE = 16, MOST_WRAPPED = 4096 };
+/* Part of the budget that parts of nodes may take in any case, however many wrapped ones there are. */
+static const double NODES_SHARE = 0.5;
 
 /* A part along one axis. `from` and `to` are texels that count from the map's first one, unwrapped. */
 typedef struct span {
@@ -83,15 +86,20 @@ typedef struct cover {
     /* Where parts go; NULL to count only. */
     fast_part *parts;
     fast_box *boxes;
-    uint32_t count, wrapped;
+    uint32_t count, wrapped; /* all; those that are FAST_WRAPPED */
+    /* Beyond these, of FAST_WRAPPED parts and of others, counts need not be right. */
+    uint32_t most_wrapped, most;
 } cover;
+
+static bool is_full(const cover *c)
+{
+    return c->wrapped > c->most_wrapped || c->count - c->wrapped > c->most;
+}
 
 static void add_part(cover *c, const fast_part *part, const fast_box *box)
 {
-    if (c->parts) {
-        c->parts[c->count] = *part;
-        c->boxes[c->count] = *box;
-    }
+    c->parts[c->count] = *part;
+    c->boxes[c->count] = *box;
     c->count++;
 }
 
@@ -113,6 +121,10 @@ static void cover_searched(cover *c)
 {
     double lower[3], upper[3];
     if (!shell_box(c->space, c->triangle, lower, upper)) return;
+    if (!c->parts) {
+        c->count++;
+        return;
+    }
     fast_part part = {.patch = c->triangle,
                       .flags = FAST_SEARCHED | FAST_WHOLE,
                       .s_min = to_float(c->frame.s0 * c->data->scale),
@@ -260,6 +272,11 @@ static void cover_cell(cover *c, const span *across, const span *down)
     polygon p = cut_out(f, across, down);
     if (p.count == 0) return;
     bool wrapped = across->wrapped || down->wrapped;
+    c->wrapped += wrapped;
+    if (!c->parts) {
+        c->count++;
+        return;
+    }
     fast_part part = {.patch = c->triangle,
                       .corner_x = (int32_t)(across->corner - f->origin_x),
                       .corner_y = (int32_t)(down->corner - f->origin_y)};
@@ -267,7 +284,6 @@ static void cover_cell(cover *c, const span *across, const span *down)
         part.flags = FAST_WRAPPED;
         part.cell_x = unwrapped_cell(across->corner - f->origin_x + f->wrapped_x);
         part.cell_y = unwrapped_cell(down->corner - f->origin_y + f->wrapped_y);
-        c->wrapped++;
     } else {
         part.level = (uint8_t)c->level;
         part.cell_x = across->cell;
@@ -287,22 +303,52 @@ static span next_span(int64_t v, int32_t size, int64_t side, knurl_wrap wrap, bo
     return (span){corner, to, corner, 0, true};
 }
 
-static void cover_row(cover *c, const span *down, int64_t x0, int64_t x1)
+/* Texels, counted from the map's first one, that a polygon is on along one axis, or nearly. */
+typedef struct texel_range {
+    int64_t from, to; /* both included */
+} texel_range;
+
+static texel_range texels_of(const double *at, int count, double pad, int64_t origin)
 {
-    const shell_space *space = c->space;
+    double low = at[0], high = at[0];
+    for (int i = 1; i < count; i++) {
+        low = min_d(low, at[i]);
+        high = max_d(high, at[i]);
+    }
+    return (texel_range){(int64_t)floor_d(low - 2.0 * pad) + origin,
+                         (int64_t)floor_d(high + 2.0 * pad) + origin};
+}
+
+/* Where `across` is reached through the wrap mode and `down` is not. */
+static void cover_column(cover *c, const span *across, const span *down)
+{
+    const triangle_frame *f = &c->frame;
+    polygon p = cut_out(f, across, down);
+    if (p.count == 0) return;
+    texel_range y = texels_of(p.y, p.count, frame_pad(f), f->origin_y);
+    int64_t side = (int64_t)16 << (2 * c->level), end = y.to < down->to ? y.to + 1 : down->to;
+    for (int64_t w = y.from > down->from ? y.from : down->from; w < end && !is_full(c);) {
+        span part = next_span(w, c->data->blocks->height, side, c->space->wrap_v, true);
+        cover_cell(c, across, &part);
+        w = part.to;
+    }
+}
+
+static void cover_row(cover *c, const span *down)
+{
+    static const span all = {INT64_MIN / 2, INT64_MAX / 2, 0, 0, false};
+    const triangle_frame *f = &c->frame;
+    polygon p = cut_out(f, &all, down);
+    if (p.count == 0) return;
+    texel_range x = texels_of(p.x, p.count, frame_pad(f), f->origin_x);
     int64_t side = (int64_t)16 << (2 * c->level);
-    for (int64_t v = x0; v <= x1 && c->wrapped <= MOST_WRAPPED;) {
-        span across = next_span(v, c->data->blocks->width, side, space->wrap_u, down->wrapped);
-        v = across.to;
-        if (!across.wrapped || down->wrapped) {
+    for (int64_t v = x.from; v <= x.to && !is_full(c);) {
+        span across = next_span(v, c->data->blocks->width, side, c->space->wrap_u, down->wrapped);
+        if (across.wrapped && !down->wrapped)
+            cover_column(c, &across, down);
+        else
             cover_cell(c, &across, down);
-            continue;
-        }
-        for (int64_t w = down->from; w < down->to;) {
-            span part = next_span(w, c->data->blocks->height, side, space->wrap_v, true);
-            cover_cell(c, &across, &part);
-            w = part.to;
-        }
+        v = across.to;
     }
 }
 
@@ -317,22 +363,13 @@ static void cover_triangle(cover *c)
         cover_searched(c);
         return;
     }
-    double pad = frame_pad(f);
-    double x0 = min_d(f->x[0], min_d(f->x[1], f->x[2])), x1 = max_d(f->x[0], max_d(f->x[1], f->x[2]));
-    double y0 = min_d(f->y[0], min_d(f->y[1], f->y[2])), y1 = max_d(f->y[0], max_d(f->y[1], f->y[2]));
-    int64_t left = (int64_t)floor_d(x0 - pad) + f->origin_x, right = (int64_t)floor_d(x1 + pad) + f->origin_x;
-    int64_t top = (int64_t)floor_d(y0 - pad) + f->origin_y, bottom = (int64_t)floor_d(y1 + pad) + f->origin_y;
+    texel_range y = texels_of(f->y, 3, frame_pad(f), f->origin_y);
     int64_t side = (int64_t)16 << (2 * c->level);
-    for (int64_t v = top; v <= bottom && c->wrapped <= MOST_WRAPPED;) {
+    for (int64_t v = y.from; v <= y.to && !is_full(c);) {
         span down = next_span(v, data->blocks->height, side, c->space->wrap_v, false);
-        cover_row(c, &down, left, right);
+        cover_row(c, &down);
         v = down.to;
     }
-    if (c->wrapped <= MOST_WRAPPED) return;
-    /* Happens while counting, so that filling takes the way above. */
-    c->data->patches[c->triangle].flags |= FAST_SEARCHED | FAST_CROWDED;
-    c->count = 0;
-    cover_searched(c);
 }
 
 /* A triangle that is no longer than two parts would meet several with little of it on each: the next level
@@ -351,17 +388,20 @@ typedef struct cover_job {
     const shell_space *space;
     fast_data *data;
     int32_t level;
-    uint32_t *first; /* per triangle: counts, then where its parts begin */
-    fast_box *boxes; /* NULL: counting */
+    uint32_t *first;             /* per triangle: counts, then where its parts begin */
+    uint32_t *wrapped;           /* per triangle: how many of those are FAST_WRAPPED */
+    fast_box *boxes;             /* NULL: counting */
+    uint32_t most_wrapped, most; /* beyond these, per triangle and in all, counting need not go on */
+    _Atomic uint64_t others;     /* parts that are not FAST_WRAPPED */
 } cover_job;
 
 static void cover_chunk(void *user, size_t begin, size_t end, int32_t thread)
 {
     (void)thread;
-    const cover_job *job = user;
-    cover c = {.space = job->space, .data = job->data, .level = job->level};
+    cover_job *job = user;
+    cover c = {.space = job->space, .data = job->data, .most_wrapped = job->most_wrapped, .most = job->most};
     height_lod_make(job->space, 0.0, &c.lod);
-    for (size_t t = begin; t < end; t++) {
+    for (size_t t = begin; t < end && (job->boxes || job->others <= job->most); t++) {
         c.triangle = (uint32_t)t;
         triangle_frame_load(job->space, c.triangle, &c.lod, &c.frame);
         if (job->boxes) {
@@ -370,27 +410,81 @@ static void cover_chunk(void *user, size_t begin, size_t end, int32_t thread)
         }
         c.level = triangle_level(&c, job->level);
         cover_triangle(&c);
-        if (!job->boxes) job->first[t] = c.count;
+        if (job->boxes) continue;
+        job->first[t] = c.count;
+        job->wrapped[t] = c.wrapped;
+        job->others += c.wrapped > c.most_wrapped ? 1 : c.count - c.wrapped;
     }
 }
 
-/* The finest level whose parts fit the budget, or -1: base triangles, searched. */
-static int32_t choose_level(const shell_space *space, const fast_data *data, double budget)
+/* Whether at most so many parts of a level are not FAST_WRAPPED. All is counted then. */
+static bool count_parts(cover_job *job, int32_t level, double most)
 {
-    for (int32_t level = 0; level < data->blocks->level_count; level++) {
-        double side = (double)((int64_t)16 << (2 * level)), parts = 0.0;
-        height_lod lod;
-        height_lod_make(space, 0.0, &lod);
-        for (uint32_t t = 0; t < space->mesh.triangle_count; t++) {
-            triangle_frame f;
-            triangle_frame_load(space, t, &lod, &f);
-            double edges =
-                fabs(f.xe) + fabs(f.xf) + fabs(f.xf - f.xe) + fabs(f.ye) + fabs(f.yf) + fabs(f.yf - f.ye);
-            parts += 0.5 * fabs(f.xe * f.yf - f.xf * f.ye) / (side * side) + 0.5 * edges / side + 1.0;
-        }
-        if (parts * PART_BYTES <= budget && parts < 0x1p30) return level;
+    job->level = level;
+    job->most = most < 0x1p30 ? (uint32_t)max_d(most, 0.0) : 1u << 30;
+    job->others = 0;
+    knurl_parallel_for(job->space->context, job->space->mesh.triangle_count, 16, cover_chunk, job);
+    return job->others <= job->most;
+}
+
+/* Triangles with more FAST_WRAPPED parts than fit are searched; those with few come first. How many parts of
+ * that kind, which are the same at every level, are left. */
+static double drop_wrapped(cover_job *job, double most)
+{
+    uint32_t triangles = job->space->mesh.triangle_count, limit = 0;
+    if (job->space->wrap_u == KNURL_WRAP_REPEAT && job->space->wrap_v == KNURL_WRAP_REPEAT) return 0.0;
+    memset(job->wrapped, 0, triangles * sizeof *job->wrapped);
+    job->most_wrapped = MOST_WRAPPED;
+    /* If this stops early, no level fits either. */
+    count_parts(job, job->data->blocks->level_count - 1, 16.0 * most + 1e6);
+    job->most_wrapped = UINT32_MAX;
+    double of_count[MOST_WRAPPED + 1] = {0.0}, left = 0.0, kept = 0.0;
+    for (uint32_t t = 0; t < triangles; t++)
+        if (job->wrapped[t] <= MOST_WRAPPED) of_count[job->wrapped[t]] += job->wrapped[t];
+    while (limit < MOST_WRAPPED && left + of_count[limit + 1] <= most) left += of_count[++limit];
+    /* Of those with one more, the first ones. */
+    for (uint32_t t = 0; t < triangles; t++) {
+        uint32_t count = job->wrapped[t];
+        if (count <= limit) continue;
+        if (count == limit + 1 && count <= MOST_WRAPPED && left + kept + count <= most)
+            kept += count;
+        else
+            job->data->patches[t].flags |= FAST_SEARCHED | FAST_CROWDED;
     }
-    return -1;
+    return left + kept;
+}
+
+/* Counts parts, of the finest level at which they fit the budget, or of none: base triangles, searched. */
+static void choose_parts(cover_job *job, double budget)
+{
+    double most = budget / PART_BYTES, wrapped = drop_wrapped(job, most);
+    double others = max_d(most - wrapped, NODES_SHARE * most);
+    for (int32_t level = 0; level < job->data->blocks->level_count; level++)
+        if (count_parts(job, level, others)) return;
+    count_parts(job, -1, 0x1p32);
+}
+
+static knurl_status fill_parts(cover_job *job, knurl_error *error)
+{
+    fast_data *data = job->data;
+    knurl_context *context = job->space->context;
+    size_t triangles = job->space->mesh.triangle_count;
+    uint64_t total = 0;
+    for (size_t t = 0; t < triangles; t++) {
+        uint32_t count = job->first[t];
+        job->first[t] = (uint32_t)total;
+        total += count;
+    }
+    if (total >= FAST_LEAF)
+        return knurl_fail(error, KNURL_ERROR_LIMIT, "method fast: %llu parts, expected under 2^31",
+                          (unsigned long long)total);
+    data->parts = knurl_alloc_array(context, total, sizeof *data->parts);
+    job->boxes = knurl_alloc_array(context, total, sizeof *job->boxes);
+    if (!data->parts || !job->boxes)
+        return knurl_fail_memory(error, total * (sizeof *job->boxes + sizeof *data->parts), "parts");
+    data->part_count = (uint32_t)total;
+    knurl_parallel_for(context, triangles, 16, cover_chunk, job);
+    return KNURL_OK;
 }
 
 knurl_status fast_cover_build(const shell_space *space, fast_data *data, double budget, fast_box **boxes,
@@ -398,33 +492,19 @@ knurl_status fast_cover_build(const shell_space *space, fast_data *data, double 
 {
     knurl_context *context = space->context;
     size_t triangles = space->mesh.triangle_count;
-    *boxes = NULL;
-    cover_job job = {.space = space, .data = data, .level = choose_level(space, data, budget)};
+    cover_job job = {.space = space, .data = data, .most_wrapped = UINT32_MAX, .most = UINT32_MAX};
     job.first = knurl_alloc_array(context, triangles, sizeof *job.first);
-    if (!job.first) return knurl_fail_memory(error, triangles * sizeof *job.first, "covering triangles");
-    knurl_parallel_for(context, triangles, 16, cover_chunk, &job);
-    uint64_t total = 0;
-    for (size_t t = 0; t < triangles; t++) {
-        uint32_t count = job.first[t];
-        job.first[t] = (uint32_t)total;
-        total += count;
-    }
-    knurl_status status = KNURL_OK;
-    if (total >= FAST_LEAF)
-        status = knurl_fail(error, KNURL_ERROR_LIMIT, "method fast: %llu parts, expected under 2^31",
-                            (unsigned long long)total);
-    if (status == KNURL_OK) {
-        data->parts = knurl_alloc_array(context, total, sizeof *data->parts);
-        *boxes = knurl_alloc_array(context, total, sizeof **boxes);
-        if (!data->parts || !*boxes)
-            status = knurl_fail_memory(error, total * (sizeof **boxes + sizeof *data->parts), "parts");
-    }
-    if (status == KNURL_OK) {
-        data->part_count = (uint32_t)total;
-        job.boxes = *boxes;
-        knurl_parallel_for(context, triangles, 16, cover_chunk, &job);
+    job.wrapped = knurl_alloc_array(context, triangles, sizeof *job.wrapped);
+    knurl_status status;
+    if (job.first && job.wrapped) {
+        choose_parts(&job, budget);
+        status = fill_parts(&job, error);
+    } else {
+        status = knurl_fail_memory(error, 2 * triangles * sizeof *job.first, "covering triangles");
     }
     knurl_free(context, job.first);
+    knurl_free(context, job.wrapped);
+    *boxes = job.boxes;
     return status;
 }
 

@@ -116,6 +116,20 @@ static knurl_status build_structures(const shell_space *space, double budget, fa
     return status;
 }
 
+static void choose_kernels(uint32_t features, fast_data *data)
+{
+    data->walk = fast_walk_plain;
+    data->walk_many = fast_walk_many_plain;
+    if (features & KNURL_CPU_AVX2) {
+        data->walk = fast_walk_avx2;
+        data->walk_many = fast_walk_many_avx2;
+    }
+    if (features & KNURL_CPU_AVX512) {
+        data->walk = fast_walk_avx512;
+        data->walk_many = fast_walk_many_avx512;
+    }
+}
+
 static knurl_status fast_build(const shell_space *space, const double *values, void **out, knurl_error *error)
 {
     fast_data *data = knurl_alloc_zero(space->context, sizeof *data);
@@ -123,9 +137,7 @@ static knurl_status fast_build(const shell_space *space, const double *values, v
     *out = data;
     data->wrap_u = space->wrap_u;
     data->wrap_v = space->wrap_v;
-    bool avx2 = (knurl_cpu_features(space->context) & KNURL_CPU_AVX2) != 0;
-    data->walk = avx2 ? fast_walk_avx2 : fast_walk_plain;
-    data->walk_many = avx2 ? fast_walk_many_avx2 : fast_walk_many_plain;
+    choose_kernels(knurl_cpu_features(space->context), data);
     knurl_status status = build_structures(space, values[0], data, error);
     data->bytes = sizeof *data + space->mesh.triangle_count * sizeof(fast_patch) +
                   data->part_count * sizeof(fast_part) +

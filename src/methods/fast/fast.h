@@ -135,10 +135,12 @@ bool fast_search(fast_ray *ray, uint32_t triangle);
 /* The traversal, compiled for any machine and for some. */
 void fast_walk_plain(fast_ray *ray);
 void fast_walk_avx2(fast_ray *ray);
+void fast_walk_avx512(fast_ray *ray);
 /* The same for up to FAST_PACKET rays at level of detail 0, those that go the same way together. */
 enum { FAST_PACKET = 8 };
 void fast_walk_many_plain(fast_ray *rays, int count);
 void fast_walk_many_avx2(fast_ray *rays, int count);
+void fast_walk_many_avx512(fast_ray *rays, int count);
 float fast_round_down(double x);
 float fast_round_up(double x);
 

@@ -341,8 +341,7 @@ LANES_INLINE bool is_inside_texel(const part_curve *c, vf4 at, int lane)
 }
 
 /* One texel that may have a root. True if the ray needs to go no further. */
-static __attribute__((noinline)) bool look_at_texel(kernel *k, const part_curve *c, const block *b,
-                                                    const texels *t, int lane)
+static bool look_at_texel(kernel *k, const part_curve *c, const block *b, const texels *t, int lane)
 {
     fast_ray *r = k->ray;
     const fast_part *part = c->part;
@@ -382,8 +381,7 @@ static __attribute__((noinline)) bool look_at_texel(kernel *k, const part_curve 
 }
 
 /* 4 x 4 texels. True if the ray needs to go no further. */
-static __attribute__((noinline)) bool visit_block(kernel *k, const part_curve *c, int32_t x, int32_t y,
-                                                  float u0, float u1)
+static bool visit_block(kernel *k, const part_curve *c, int32_t x, int32_t y, float u0, float u1)
 {
     block b = {.x = x, .y = y, .u0 = u0, .length = u1 - u0};
     vf4 length = set4(b.length);
@@ -495,8 +493,7 @@ static bool visit_node(kernel *k, const part_curve *c, int level, int32_t x, int
 enum { MOST_HALVINGS = 6 };
 
 /* The curve over a part between two local parameters; halved where it bends too much for one chord. */
-static __attribute__((noinline)) bool visit_stretch(kernel *k, const fast_part *part, float a, float b,
-                                                    int halvings)
+static bool visit_stretch(kernel *k, const fast_part *part, float a, float b, int halvings)
 {
     part_curve c;
     c.part = part;
@@ -529,7 +526,7 @@ static __attribute__((noinline)) bool visit_stretch(kernel *k, const fast_part *
     return visit_node(k, &c, part->level, 0, 0, c.u0, c.u1);
 }
 
-static __attribute__((noinline)) bool visit_part(kernel *k, uint32_t number)
+static bool visit_part(kernel *k, uint32_t number)
 {
     const fast_part *part = &k->data->parts[number];
     fast_ray *r = k->ray;
@@ -769,129 +766,15 @@ static void walk_packet(packet *p, kernel *kernels, const fast_node *nodes)
     }
 }
 
-/* ---- Waves -------------------------------------------------------------------------------------------- */
-
-/* Rays that do not go the same way take turns: while one works on what has arrived from memory, what the
- * others need next is on its way. */
-typedef enum wave_stage { WAVE_NODE, WAVE_PART, WAVE_PATCH } wave_stage;
-
-enum { WAVE_STACK = 128 };
-
-typedef struct wave_ray {
-    kernel k;
-    vf4 inverse, shift;
-    int enter[3];
-    wave_stage stage;
-    uint32_t next; /* a node, or a part */
-    int top;
-    tree_entry stack[WAVE_STACK];
-} wave_ray;
-
-LANES_INLINE void prefetch_bytes(const void *p, size_t bytes)
-{
-    for (size_t i = 0; i < bytes; i += 64) __builtin_prefetch((const char *)p + i);
-}
-
-static void start_wave_ray(wave_ray *w, fast_ray *r)
-{
-    start_kernel(&w->k, r);
-    vf4 direction = {(float)r->direction[0], (float)r->direction[1], (float)r->direction[2], 1.0f};
-    vf4 origin = {(float)r->origin[0], (float)r->origin[1], (float)r->origin[2], 0.0f};
-    w->inverse = safe_inverse4(direction);
-    w->shift = -origin * w->inverse;
-    for (int i = 0; i < 3; i++) w->enter[i] = w->inverse[i] < 0.0f ? 3 : 0;
-    w->stage = WAVE_NODE;
-    w->next = 0;
-    w->top = 0;
-}
-
-/* Takes what is next from the stack, and has it fetched. False if there is nothing. */
-static bool next_of_wave(wave_ray *w, const fast_node *nodes)
-{
-    while (w->top > 0) {
-        tree_entry at = w->stack[--w->top];
-        if (at.near > w->k.tau_max) continue;
-        if (at.child & FAST_LEAF) {
-            w->stage = WAVE_PART;
-            w->next = at.child & ~FAST_LEAF;
-            prefetch_bytes(&w->k.data->parts[w->next], sizeof(fast_part));
-        } else {
-            w->stage = WAVE_NODE;
-            w->next = at.child;
-            prefetch_bytes(&nodes[at.child], sizeof(fast_node));
-        }
-        return true;
-    }
-    return false;
-}
-
-static void fetch_patch(wave_ray *w)
-{
-    const fast_part *part = &w->k.data->parts[w->next];
-    w->stage = WAVE_PATCH;
-    if (part->flags & FAST_SEARCHED) return;
-    prefetch_bytes(&w->k.data->patches[part->patch], sizeof(fast_patch));
-    if (!(part->flags & FAST_WRAPPED)) __builtin_prefetch(part_node(&w->k, part, part->level, 0, 0));
-}
-
-/* One turn of a ray. False if it is done. */
-static bool step_wave(wave_ray *w, const fast_node *nodes)
-{
-    kernel *k = &w->k;
-    if (w->stage == WAVE_PART) {
-        fetch_patch(w);
-        return true;
-    }
-    if (w->stage == WAVE_PATCH) {
-        if (visit_part(k, w->next)) return false;
-        k->tau_max = float_above(k->ray->tau_max);
-        return next_of_wave(w, nodes);
-    }
-    const fast_node *n = &nodes[w->next];
-    k->ray->steps++;
-    vf8 near = set8(k->tau_min), far = set8(k->tau_max);
-    for (int i = 0; i < 3; i++) {
-        vf8 inverse = set8(w->inverse[i]), shift = set8(w->shift[i]);
-        near = max8(mad8(load8(n->bound[i + w->enter[i]]), inverse, shift), near);
-        far = min8(mad8(load8(n->bound[i + 3 - w->enter[i]]), inverse, shift), far);
-    }
-    if (w->top + FAST_WIDTH > WAVE_STACK) {
-        /* A tree this deep is walked in one go. */
-        FAST_WALK(k->ray);
-        return false;
-    }
-    w->top = push_children(n, mask8(near <= far), near, w->stack, w->top);
-    return next_of_wave(w, nodes);
-}
-
-static void walk_wave(fast_ray *rays, int count, const fast_node *nodes)
-{
-    wave_ray wave[FAST_PACKET];
-    int order[FAST_PACKET], left = count;
-    for (int i = 0; i < count; i++) {
-        start_wave_ray(&wave[i], &rays[i]);
-        order[i] = i;
-    }
-    while (left > 0)
-        for (int i = 0; i < left;) {
-            if (step_wave(&wave[order[i]], nodes))
-                i++;
-            else
-                order[i] = order[--left];
-        }
-}
-
 void FAST_WALK_MANY(fast_ray *rays, int count)
 {
     const fast_node *nodes = rays[0].coarse ? NULL : rays[0].data->fine.nodes;
     packet p;
-    if (!nodes || count == 1) {
+    if (!nodes || count < FAST_PACKET / 2 || !make_packet(rays, count, &p)) {
         for (int i = 0; i < count; i++) FAST_WALK(&rays[i]);
-    } else if (count >= FAST_PACKET / 2 && make_packet(rays, count, &p)) {
-        kernel kernels[FAST_PACKET];
-        for (int i = 0; i < count; i++) start_kernel(&kernels[i], &rays[i]);
-        walk_packet(&p, kernels, nodes);
-    } else {
-        walk_wave(rays, count, nodes);
+        return;
     }
+    kernel kernels[FAST_PACKET];
+    for (int i = 0; i < count; i++) start_kernel(&kernels[i], &rays[i]);
+    walk_packet(&p, kernels, nodes);
 }
