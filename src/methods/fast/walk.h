@@ -304,12 +304,13 @@ static int texel_roots(float g0, float gm, float g1, float margin, float w[2], f
     return count;
 }
 
-/* Barycentrics at (x, y), plus `sign` times the bounds on their errors: bit i, whether b_i is negative. */
-static uint32_t negative_sides(const part_curve *c, float x, float y, float sign)
+/* Barycentrics at (x, y), plus `sign` times the bounds on their errors, for a curve that may be (off_x,
+ * off_y) away: bit i, whether b_i is negative. */
+static uint32_t negative_sides(const part_curve *c, float x, float y, float off_x, float off_y, float sign)
 {
     const fast_patch *p = c->patch;
     vf4 ex = load4(p->edge[1]), ey = load4(p->edge[2]);
-    vf4 slack = mad4(abs4(ex), set4(c->error[0]), mad4(abs4(ey), set4(c->error[1]), load4(p->edge_error)));
+    vf4 slack = mad4(abs4(ex), set4(off_x), mad4(abs4(ey), set4(off_y), load4(p->edge_error)));
     vf4 b = mad4(ex, set4(x), mad4(ey, set4(y), load4(p->edge[0]) + set4(sign) * slack));
     return mask4(b < set4(0.0f)) & 7u;
 }
@@ -328,16 +329,21 @@ LANES_INLINE vf4 block_value(const block *b, float v)
 static bool passes_outside(const part_curve *c, const block *b, float v0, float v1)
 {
     float cx = (float)(c->part->corner_x + b->x), cy = (float)(c->part->corner_y + b->y);
-    vf4 first = block_value(b, v0), last = block_value(b, v1);
-    return (negative_sides(c, first[0] + cx, first[1] + cy, 1.0f) &
-            negative_sides(c, last[0] + cx, last[1] + cy, 1.0f)) != 0;
+    vf4 first = block_value(b, v0), last = block_value(b, v1),
+        bow = abs4(b->c2) * set4(0.25f * (v1 - v0) * (v1 - v0));
+    float off_x = c->error[0] + bow[0], off_y = c->error[1] + bow[1];
+    return (negative_sides(c, first[0] + cx, first[1] + cy, off_x, off_y, 1.0f) &
+            negative_sides(c, last[0] + cx, last[1] + cy, off_x, off_y, 1.0f)) != 0;
 }
 
-/* Whether a point of the curve, in texels from the block's corner, is on the texel and not just near it. */
-LANES_INLINE bool is_inside_texel(const part_curve *c, vf4 at, int lane)
+/* Whether the curve's point at v is on the texel and in the triangle, and not just near them. */
+LANES_INLINE bool is_surely_on(const part_curve *c, const block *b, float v, int lane)
 {
+    vf4 at = block_value(b, v);
     float x = at[0] - (float)(lane & 3), y = at[1] - (float)(lane >> 2);
-    return x > c->error[0] && x < 1.0f - c->error[0] && y > c->error[1] && y < 1.0f - c->error[1];
+    return x > c->error[0] && x < 1.0f - c->error[0] && y > c->error[1] && y < 1.0f - c->error[1] &&
+           !negative_sides(c, at[0] + (float)(c->part->corner_x + b->x),
+                           at[1] + (float)(c->part->corner_y + b->y), c->error[0], c->error[1], -1.0f);
 }
 
 /* One texel that may have a root. True if the ray needs to go no further. */
@@ -359,20 +365,20 @@ static bool look_at_texel(kernel *k, const part_curve *c, const block *b, const 
     }
     found.certain = true;
     for (int i = 0; i < count; i++) {
-        float v = v0 + w[i] * length;
-        vf4 at = block_value(b, v);
-        found.x = at[0] + (float)(part->corner_x + b->x);
-        found.y = at[1] + (float)(part->corner_y + b->y);
-        if (negative_sides(c, found.x, found.y, 1.0f)) continue;
+        /* The root is somewhere between these. */
+        float v = v0 + w[i] * length, first = v - reach[i] * length, last = v + reach[i] * length;
+        if (passes_outside(c, b, first, last)) continue;
         found.tau = curve_tau(k, c, b, v);
         double off = slack + (double)(reach[i] * length * b->length) * (double)c->length;
         if (found.tau + off < r->tau_min || found.tau - off > r->tau_max) continue;
-        if (r->any && is_inside_texel(c, at, lane) && w[i] >= reach[i] && w[i] <= 1.0f - reach[i] &&
-            found.tau - off > r->tau_min && found.tau + off < r->tau_max &&
-            !negative_sides(c, found.x, found.y, -1.0f)) {
+        if (r->any && found.tau - off > r->tau_min && found.tau + off < r->tau_max &&
+            is_surely_on(c, b, first, lane) && is_surely_on(c, b, last, lane)) {
             r->found = true;
             return true;
         }
+        vf4 at = block_value(b, v);
+        found.x = at[0] + (float)(part->corner_x + b->x);
+        found.y = at[1] + (float)(part->corner_y + b->y);
         found.tau_in = found.tau - off;
         found.tau_out = found.tau + off;
         if (fast_decide(r, &found)) return r->any;
