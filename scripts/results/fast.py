@@ -13,6 +13,7 @@ TRIANGLES, GRIDS = "tessellation", "tessellation:primitive=grids"
 # Secondary rays start this far off the surface, in diagonals of the scene: from the exact surface itself, a third
 # of them would start behind a facet and end there at once. For maps of 1k and more; smaller ones need more.
 LIFT = 3e-4
+MOST_RAYS = 20000  # of a set, unless two threads share them: there are many sets, scenes and methods
 MEMORY_BOUND = 8e9  # bytes, for one method on one scene
 # Of the tessellated size that `knurl info` estimates for triangles: with rows of the facets' own numbers, and
 # grids, as measured.
@@ -105,6 +106,7 @@ def run(result, scene, methods, threads=1, count=None):
     kept = fitting(result, scene, methods)
     extra = ["--displaced-only", "--calls", "both", "--threads", threads, "--tile-scale", scene.tile, "--lift", LIFT * reduction(result.session),
              "--memory-limit", int(memory_limit(result.session))]
+    count = count or min(MOST_RAYS, result.session.limits["count"])
     scene.rows = result.bench(scene.path, kept, rays=",".join(RAYS), frame=False, count=count, extra=extra,
                               label=scene.label)
     return scene

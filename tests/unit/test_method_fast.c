@@ -459,20 +459,21 @@ static void budgets_hold(void **state)
     def.displacement.map = map;
     def.displacement.factor = 0.01;
     for (uint32_t n = 0; n < 9 * 5 * 4; n++) {
-        char method[64];
+        char specification[64];
         double budget = budgets[n % 4], scale = tiles[n / 4 % 5];
-        snprintf(method, sizeof method, "fast:budget=%g", budget);
-        def.method = method;
+        snprintf(specification, sizeof specification, "fast:budget=%g", budget);
+        def.method = specification;
         def.displacement.wrap_u = (knurl_wrap)(n / 20 % 3);
         def.displacement.wrap_v = (knurl_wrap)(n / 60);
         for (int k = 0; k < 2; k++) def.displacement.uv_scale[k] = scale;
         knurl_surface *surface = NULL;
         assert_int_equal(knurl_surface_create(context, &def, &surface, NULL), KNURL_OK);
         const fast_data *data = surface->data;
-        double bytes = data->part_count * sizeof(fast_part) + data->fine.node_count * sizeof(fast_node);
+        double bytes =
+            (double)(data->part_count * sizeof(fast_part) + data->fine.node_count * sizeof(fast_node));
         bool whole = data->part_count == FACES;
         if (!(bytes <= 2.0 * budget * 1048576.0) && !whole)
-            fail_msg("%s, tiles %g, case %u: %u parts, %g MiB", method, scale, n, data->part_count,
+            fail_msg("%s, tiles %g, case %u: %u parts, %g MiB", specification, scale, n, data->part_count,
                      bytes / 1048576.0);
         /* 81 tiles of 91 parts of 16 x 16 texels, more with those that triangles share, are 1.3 MiB. */
         if (budget >= 8.0 && scale <= 9.0)

@@ -427,26 +427,42 @@ static bool count_parts(cover_job *job, int32_t level, double most)
     return job->others <= job->most;
 }
 
+/* Counts FAST_WRAPPED parts, which are the same at every level, up to some per triangle; returns how many
+ * those are: as many as there can be without taking time for what will not fit. */
+static uint32_t count_wrapped(cover_job *job, double most)
+{
+    uint32_t triangles = job->space->mesh.triangle_count;
+    for (uint32_t limit = 16;; limit *= 4) {
+        double total = 0.0;
+        bool all = true;
+        memset(job->wrapped, 0, triangles * sizeof *job->wrapped);
+        job->most_wrapped = limit;
+        /* If this stops early, no level fits either. */
+        count_parts(job, job->data->blocks->level_count - 1, 4.0 * most + 1024.0);
+        job->most_wrapped = UINT32_MAX;
+        for (uint32_t t = 0; t < triangles; t++) {
+            all = all && job->wrapped[t] <= limit;
+            total += min_d(job->wrapped[t], limit + 1);
+        }
+        if (all || total > most || limit == MOST_WRAPPED) return limit;
+    }
+}
+
 /* Triangles with more FAST_WRAPPED parts than fit are searched; those with few come first. How many parts of
- * that kind, which are the same at every level, are left. */
+ * that kind are left. */
 static double drop_wrapped(cover_job *job, double most)
 {
-    uint32_t triangles = job->space->mesh.triangle_count, limit = 0;
     if (job->space->wrap_u == KNURL_WRAP_REPEAT && job->space->wrap_v == KNURL_WRAP_REPEAT) return 0.0;
-    memset(job->wrapped, 0, triangles * sizeof *job->wrapped);
-    job->most_wrapped = MOST_WRAPPED;
-    /* If this stops early, no level fits either. */
-    count_parts(job, job->data->blocks->level_count - 1, 16.0 * most + 1e6);
-    job->most_wrapped = UINT32_MAX;
+    uint32_t triangles = job->space->mesh.triangle_count, counted = count_wrapped(job, most), limit = 0;
     double of_count[MOST_WRAPPED + 1] = {0.0}, left = 0.0, kept = 0.0;
     for (uint32_t t = 0; t < triangles; t++)
-        if (job->wrapped[t] <= MOST_WRAPPED) of_count[job->wrapped[t]] += job->wrapped[t];
-    while (limit < MOST_WRAPPED && left + of_count[limit + 1] <= most) left += of_count[++limit];
+        if (job->wrapped[t] <= counted) of_count[job->wrapped[t]] += job->wrapped[t];
+    while (limit < counted && left + of_count[limit + 1] <= most) left += of_count[++limit];
     /* Of those with one more, the first ones. */
     for (uint32_t t = 0; t < triangles; t++) {
         uint32_t count = job->wrapped[t];
         if (count <= limit) continue;
-        if (count == limit + 1 && count <= MOST_WRAPPED && left + kept + count <= most)
+        if (count == limit + 1 && count <= counted && left + kept + count <= most)
             kept += count;
         else
             job->data->patches[t].flags |= FAST_SEARCHED | FAST_CROWDED;
