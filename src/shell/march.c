@@ -117,6 +117,12 @@ static bool leaf(shell_walk *walk, const cell_function *f, sample a, sample b)
             if (accept(walk, f, bracketed_root(f, a, b))) return true;
             continue;
         }
+        /* The ray runs in the surface: halves would look the same, down to the last of 2^26. */
+        if (max_d(max_d(fabs(a.g), fabs(b.g)), max_d(fabs(g1), fabs(g2))) <= f->rounding) {
+            if (accept(walk, f, a.p) || accept(walk, f, 0.5 * (a.p + b.p)) || accept(walk, f, b.p))
+                return true;
+            continue;
+        }
         if (depth == LEAF_DEPTH || a.p == b.p) {
             if (last_resort(walk, f, a, b)) return true;
             continue;

@@ -862,12 +862,31 @@ static void budgets(void **state)
     RUN(cases);
 }
 
+/* Outside of one side of a triangle at both ends of a texel, and inside between them. */
+static void a_curve_bows_into_a_triangle(void **state)
+{
+    (void)state;
+    static const fast_case c = {SURFACE("bow", make_torus, 3, 5, ORACLE_U16, NOISE, 0.2, 0.0)};
+    static setup s;
+    const double origin[3] = {-0x1.02a844e479d48p-4, 0x1.b2a77aacfead4p-1, -0x1.9761a75ce6bacp-1};
+    const double direction[3] = {-0x1.699c13b10198fp-4, -0x1.0c3bbb2985d4ep-5, 0x1.db043476179d6p-6};
+    setup_make(&s, &c);
+    knurl_ray ray = knurl_ray_make(origin, direction);
+    knurl_hit f, q;
+    assert_true(first_hit(s.fast, ray, &f) && first_hit(s.rmip, ray, &q));
+    assert_int_equal(q.triangle, 29);
+    assert_int_equal(compare_hits(&s, &ray, &f, &q), SAME);
+    setup_free(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(map_sizes), cmocka_unit_test(heights),          cmocka_unit_test(large_offsets),
-        cmocka_unit_test(wrapping),  cmocka_unit_test(transforms),       cmocka_unit_test(shapes),
-        cmocka_unit_test(places),    cmocka_unit_test(levels_of_detail), cmocka_unit_test(budgets),
+        cmocka_unit_test(map_sizes),     cmocka_unit_test(heights),
+        cmocka_unit_test(large_offsets), cmocka_unit_test(wrapping),
+        cmocka_unit_test(transforms),    cmocka_unit_test(shapes),
+        cmocka_unit_test(places),        cmocka_unit_test(levels_of_detail),
+        cmocka_unit_test(budgets),       cmocka_unit_test(a_curve_bows_into_a_triangle),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

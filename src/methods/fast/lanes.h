@@ -13,7 +13,7 @@
 #endif
 
 /* All functions here are inlined, so how vectors are handed over does not matter. */
-#if defined(__GNUC__) && !defined(__clang__)
+#if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
