@@ -14,7 +14,7 @@ TRIANGLES, GRIDS = "tessellation", "tessellation:primitive=grids"
 # of them would start behind a facet and end there at once. For maps of 1k and more; smaller ones need more.
 LIFT = 3e-4
 MOST_RAYS = 20000  # of a set, unless two threads share them: there are many sets, scenes and methods
-MEMORY_BOUND = 8e9  # bytes, for one method on one scene
+MEMORY_BOUND = 5e9  # bytes, for one method on one scene at the default level: twice what other pages may take
 # Of the tessellated size that `knurl info` estimates for triangles: with rows of the facets' own numbers, and
 # grids, as measured.
 ESTIMATE = {TRIANGLES: 1.05, GRIDS: 0.25}
@@ -84,7 +84,8 @@ def sized_scene(result, name, texels):
 def memory_limit(session):
     units = {"K": 2**10, "M": 2**20, "G": 2**30}
     text = session.limits["memory"]
-    return min(MEMORY_BOUND, int(text[:-1]) * units[text[-1]])
+    limit = int(text[:-1]) * units[text[-1]]
+    return limit if limit < 2**30 else max(MEMORY_BOUND, limit)
 
 
 def fitting(result, scene, methods):
@@ -319,7 +320,10 @@ def page(session):
         result.text("**This build has no method `fast`: `%s` stands in for it in all that follows.**" % method)
     result.text("Aims and what was reached. The figures are ratios over all scenes and ray sets below; *mean* is the "
                 "geometric one. Scenes hold their displaced surfaces only (`--displaced-only`): floors and stands cost "
-                "every method the same.")
+                "every method the same. Of each set %d rays are traced on this page, %d where two threads share them, and a "
+                "method may take %s on a scene." %
+                (min(MOST_RAYS, session.limits["count"]), max(100000, session.limits["count"]),
+                 size(memory_limit(session))))
     result.table(["figure", "aim", "mean", "worst", "where", "of", ""], aims.lines, left=2)
     result.text("Million rays per second of processor time on one core, medians of rounds in which all methods and kinds "
                 "of calls take turns. *single* is a call for each ray; *batch* is `knurl_scene_intersect_batch`, which "
