@@ -126,7 +126,8 @@ KNURL_API bool knurl_surface_intersect(const knurl_surface *surface, uint32_t sh
 /* Whether anything of one shell lies in [tmin, tmax]. */
 KNURL_API bool knurl_surface_occluded(const knurl_surface *surface, uint32_t shell, const knurl_ray *ray);
 /* The same for many rays at once, which methods with a hierarchy of their own make use of: found[i] says
- * whether ray i hit, hits[i] (not read before, fully written where found) what. */
+ * whether ray i hit, hits[i] (not read before, fully written where found) what; hits[i].steps is the work of
+ * ray i either way. */
 KNURL_API void knurl_surface_intersect_many(const knurl_surface *surface, uint32_t shell,
                                             const knurl_ray *rays, size_t count, knurl_hit *hits,
                                             bool *found);

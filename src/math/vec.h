@@ -13,6 +13,18 @@ static inline float to_float(double x)
     return f;
 }
 
+/* The nearest floats not above and not below x. */
+static inline float float_down(double x)
+{
+    float f = to_float(x);
+    return (double)f > x ? nextafterf(f, -INFINITY) : f;
+}
+static inline float float_up(double x)
+{
+    float f = to_float(x);
+    return (double)f < x ? nextafterf(f, INFINITY) : f;
+}
+
 /* One instruction each, unlike fmin and fmax, which must tell NaN apart: if one argument is NaN the
  * result is b. */
 static inline double min_d(double a, double b)

@@ -39,7 +39,7 @@ static knurl_status parse_value(const knurl_method_parameter *p, const char *tex
     if (end == copy || *end || !(*value >= p->least && *value <= p->most) ||
         (p->whole && *value != floor(*value)))
         return knurl_fail(error, KNURL_ERROR_ARGUMENT,
-                          "method parameter %s: found '%.*s', expected a %s from %g to %g", p->name,
+                          "method parameter %s: found '%.*s', expected a %s from %.10g to %.10g", p->name,
                           length < 100 ? (int)length : 100, text, p->whole ? "whole number" : "number",
                           p->least, p->most);
     return KNURL_OK;
@@ -47,13 +47,18 @@ static knurl_status parse_value(const knurl_method_parameter *p, const char *tex
 
 /* One "name=value" of `length` characters. */
 static knurl_status parse_assignment(const method *m, const char *text, size_t length, double *values,
-                                     knurl_error *error)
+                                     uint32_t *given, knurl_error *error)
 {
     const char *equals = memchr(text, '=', length);
     size_t name = equals ? (size_t)(equals - text) : length;
-    for (int i = 0; equals && m->parameters[i].name; i++)
-        if (strlen(m->parameters[i].name) == name && memcmp(m->parameters[i].name, text, name) == 0)
-            return parse_value(&m->parameters[i], equals + 1, length - name - 1, &values[i], error);
+    for (int i = 0; equals && m->parameters[i].name; i++) {
+        if (strlen(m->parameters[i].name) != name || memcmp(m->parameters[i].name, text, name) != 0) continue;
+        if (*given >> i & 1u)
+            return knurl_fail(error, KNURL_ERROR_ARGUMENT, "method parameter %s: given twice",
+                              m->parameters[i].name);
+        *given |= 1u << i;
+        return parse_value(&m->parameters[i], equals + 1, length - name - 1, &values[i], error);
+    }
     char list[256] = "none";
     size_t used = 0;
     for (int i = 0; m->parameters[i].name; i++) {
@@ -77,10 +82,11 @@ knurl_status method_parse(const char *specification, const method **found,
                           length < 100 ? (int)length : 100, specification);
     for (int i = 0; m->parameters[i].name; i++) values[i] = m->parameters[i].preset;
     const char *at = specification + length;
+    uint32_t given = 0; /* a bit per parameter */
     while (*at == ':') {
         at++;
         length = strcspn(at, ":");
-        knurl_status status = parse_assignment(m, at, length, values, error);
+        knurl_status status = parse_assignment(m, at, length, values, &given, error);
         if (status != KNURL_OK) return status;
         at += length;
     }

@@ -12,18 +12,6 @@ static const double FOLD_MARGIN_DIRECTIONS = 1e-5;
 /* Interpolated normals shorter than this are as good as opposing. */
 static const double LEAST_NORMAL = 1e-3;
 
-static float round_down(double x)
-{
-    float f = to_float(x);
-    return (double)f > x ? nextafterf(f, -INFINITY) : f;
-}
-
-static float round_up(double x)
-{
-    float f = to_float(x);
-    return (double)f < x ? nextafterf(f, INFINITY) : f;
-}
-
 /* Distance from the origin to the segment a b. */
 static double segment_distance(vec3 a, vec3 b)
 {
@@ -111,8 +99,8 @@ static void set_height_range(const triangle_frame *f, shell *stored)
     }
     double s0 = h0 < 0.0 ? h0 / n_min : h0 / n_max, s1 = h1 > 0.0 ? h1 / n_min : h1 / n_max;
     double pad = 1e-9 * max_d(fabs(s0), fabs(s1)) + 1e-13 * f->size;
-    stored->s_min = round_down(s0 - pad);
-    stored->s_max = round_up(s1 + pad);
+    stored->s_min = float_down(s0 - pad);
+    stored->s_max = float_up(s1 + pad);
 }
 
 static double offset_area(const triangle_frame *f, double s)
@@ -127,11 +115,11 @@ void shell_shape(const shell_space *space, const height_lod *lod, uint32_t trian
     triangle_frame f;
     triangle_frame_load(space, triangle, lod, &f);
     double least = least_normal(&f);
-    stored->normal_min = space->unnormalised ? 1.0f : round_down(max_d(least, LEAST_NORMAL));
+    stored->normal_min = space->unnormalised ? 1.0f : float_down(max_d(least, LEAST_NORMAL));
     set_height_range(&f, stored);
     f.s0 = (double)stored->s_min;
     f.s1 = (double)stored->s_max;
-    stored->area = round_up((1.0 + 1e-9) * max_d(offset_area(&f, f.s0), offset_area(&f, f.s1)));
+    stored->area = float_up((1.0 + 1e-9) * max_d(offset_area(&f, f.s0), offset_area(&f, f.s1)));
     unsigned flags = 0;
     if (is_empty(&f))
         flags |= SHELL_EMPTY;

@@ -51,18 +51,6 @@ typedef struct span {
     float low, high;
 } span;
 
-static float round_down(double x)
-{
-    float f = to_float(x);
-    return (double)f > x ? nextafterf(f, -INFINITY) : f;
-}
-
-static float round_up(double x)
-{
-    float f = to_float(x);
-    return (double)f < x ? nextafterf(f, INFINITY) : f;
-}
-
 /* Map values as heights, widened by more than anything that evaluates the surface rounds. How much must not
  * depend on the values, so that ranges of unions are unions of ranges. */
 static span span_of(const shell_space *space, double low, double high)
@@ -72,7 +60,7 @@ static span span_of(const shell_space *space, double low, double high)
     if (map->levels[0].format == KNURL_PIXEL_F32) most = max_d(fabs(map->range_min), fabs(map->range_max));
     double a = space->offset + space->factor * low, b = space->offset + space->factor * high;
     double pad = 16.0 * DBL_EPSILON * (fabs(space->offset) + fabs(space->factor) * most);
-    return (span){round_down(min_d(a, b) - pad), round_up(max_d(a, b) + pad)};
+    return (span){float_down(min_d(a, b) - pad), float_up(max_d(a, b) + pad)};
 }
 
 /* A triangle's box in (u, v), and in the texels of a level of detail. */

@@ -69,6 +69,7 @@ expect_error 2 "--accel-budget: found with --method rmip:bounds=minmax, expected
 expect_error 2 "--accel-budget: found beside --method fast:budget=3, expected one budget" "$knurl" render plane.obj -o a.png --method fast:budget=3 --accel-budget 1M
 expect_error 2 "method parameter bounds: found 'boxes', expected one of minmax|rmip" "$knurl" render plane.obj -o a.png --method rmip:bounds=boxes
 expect_error 2 "method rmip: found 'speed=9', expected PARAMETER=VALUE" "$knurl" render plane.obj -o a.png --method rmip:speed=9
+expect_error 2 "method parameter budget: given twice" "$knurl" render plane.obj -o a.png --method fast:budget=1:budget=2
 expect_error 2 "marching-scale: found '0', expected a number from 1 to 4096" "$knurl" render plane.obj -o a.png --method rmip:marching-scale=0
 expect_error 2 "--memory-limit: found '2X', expected bytes such as 500M" "$knurl" render plane.obj -o a.png --memory-limit 2X
 expect_error 2 "--threads: found '4096', expected" "$knurl" render plane.obj -o a.png --threads 4096

@@ -169,10 +169,13 @@ static void kernels_agree(void **state)
         truth_scene scene;
         assert_true(truth_torus_make(&scene, "torus", shapes[n].around, shapes[n].across, shapes[n].factor,
                                      shapes[n].offset, 0.0));
-        knurl_context *contexts[2] = {make_context(0), make_context(UINT32_MAX)};
-        knurl_surface *surfaces[2];
+        /* The plain kernel, AVX2's, and the best that this machine has. */
+        enum { KERNELS = 3 };
+        knurl_context *contexts[KERNELS] = {make_context(0), make_context(KNURL_CPU_SSE41 | KNURL_CPU_AVX2),
+                                            make_context(UINT32_MAX)};
+        knurl_surface *surfaces[KERNELS];
         knurl_status status;
-        for (int i = 0; i < 2; i++) {
+        for (int i = 0; i < KERNELS; i++) {
             surfaces[i] = make_torus(contexts[i], &scene, "fast", &status);
             assert_int_equal(status, KNURL_OK);
         }
@@ -185,26 +188,29 @@ static void kernels_agree(void **state)
                 direction[k] = random_range(&random, -1.4, 1.4) * (k == 1 ? 0.4 : 1.0) - origin[k];
             }
             knurl_ray ray = knurl_ray_make(origin, direction);
-            knurl_hit hit[2] = {{.triangle = KNURL_NO_HIT}, {.triangle = KNURL_NO_HIT}};
-            bool found[2], occluded[2];
-            for (int k = 0; k < 2; k++) {
+            knurl_hit hit[KERNELS];
+            bool found[KERNELS], occluded[KERNELS];
+            for (int k = 0; k < KERNELS; k++) {
+                hit[k] = (knurl_hit){.triangle = KNURL_NO_HIT};
                 found[k] = knurl_surface_intersect(surfaces[k], 0, &ray, &hit[k]);
                 occluded[k] = knurl_surface_occluded(surfaces[k], 0, &ray);
             }
             hits += found[0];
-            if (found[0] != found[1] || occluded[0] != found[0] || occluded[1] != found[1] ||
-                (found[0] && (hit[0].triangle != hit[1].triangle ||
-                              fabs(hit[0].t - hit[1].t) > 1e-12 * (1.0 + hit[0].t))))
-                if (differ++ < 4)
-                    printf("torus %zu: %a,%a,%a direction %a,%a,%a: found %d %d occluded %d %d triangles %u "
-                           "%u t %.17g %.17g\n",
-                           n, origin[0], origin[1], origin[2], direction[0], direction[1], direction[2],
-                           found[0], found[1], occluded[0], occluded[1], hit[0].triangle, hit[1].triangle,
-                           hit[0].t, hit[1].t);
+            for (int k = 1; k < KERNELS; k++)
+                if (found[0] != found[k] || occluded[0] != found[0] || occluded[k] != found[k] ||
+                    (found[0] && (hit[0].triangle != hit[k].triangle ||
+                                  fabs(hit[0].t - hit[k].t) > 1e-12 * (1.0 + hit[0].t))))
+                    if (differ++ < 4)
+                        printf(
+                            "torus %zu, kernel %d: %a,%a,%a direction %a,%a,%a: found %d %d occluded %d %d "
+                            "triangles %u %u t %.17g %.17g\n",
+                            n, k, origin[0], origin[1], origin[2], direction[0], direction[1], direction[2],
+                            found[0], found[k], occluded[0], occluded[k], hit[0].triangle, hit[k].triangle,
+                            hit[0].t, hit[k].t);
         }
         assert_true(hits > 5000);
         assert_int_equal(differ, 0);
-        for (int i = 0; i < 2; i++) {
+        for (int i = 0; i < KERNELS; i++) {
             knurl_surface_release(surfaces[i]);
             knurl_context_release(contexts[i]);
         }

@@ -129,7 +129,7 @@ static void check_patches(const knurl_surface *surface, const fast_data *data)
         triangle_frame frame;
         fast_patch patch;
         triangle_frame_load(space, t, &lod, &frame);
-        fast_patch_make(data, &frame, &patch);
+        fast_patch_make(&frame, &patch);
         if (data->patches[t].flags & FAST_CROWDED) patch.flags |= FAST_SEARCHED | FAST_CROWDED;
         assert_memory_equal(&patch, &data->patches[t], sizeof patch);
     }

@@ -110,8 +110,8 @@ static fast_box padded(const fast_data *data, vec3 lower, vec3 upper)
     v3_store(lo, v3_scale(v3_sub(lower, v3_load(data->centre)), data->scale));
     v3_store(hi, v3_scale(v3_sub(upper, v3_load(data->centre)), data->scale));
     for (int k = 0; k < 3; k++) {
-        box.lower[k] = fast_round_down(lo[k] - BOX_PAD);
-        box.upper[k] = fast_round_up(hi[k] + BOX_PAD);
+        box.lower[k] = float_down(lo[k] - BOX_PAD);
+        box.upper[k] = float_up(hi[k] + BOX_PAD);
     }
     return box;
 }
@@ -233,8 +233,8 @@ static fast_box measure_part(const cover *c, fast_part *part, const polygon *p)
         lower = v3_min(lower, v3_min(a, b));
         upper = v3_max(upper, v3_max(a, b));
     }
-    part->s_min = fast_round_down(s0 * c->data->scale);
-    part->s_max = fast_round_up(s1 * c->data->scale);
+    part->s_min = float_down(s0 * c->data->scale);
+    part->s_max = float_up(s1 * c->data->scale);
     set_extent(part, p);
     /* Bounds on the curve's error (walk.h) count on this. */
     if (n[0] >= 0.5)

@@ -68,8 +68,7 @@ void fast_set_heights(const shell_space *space, fast_data *data)
     double rounding = 0x1p-20 * (fabs(base) + 65535.0 * fabs(code));
     data->height_base = (float)base;
     data->height_code = (float)code;
-    data->height_error =
-        fast_round_up(fabs(space->factor) * blocks->code_error * data->scale * 1.001 + rounding);
+    data->height_error = float_up(fabs(space->factor) * blocks->code_error * data->scale * 1.001 + rounding);
 }
 
 fast_box fast_coarse_box(const shell_space *space, const fast_data *data, uint32_t triangle)
@@ -79,8 +78,8 @@ fast_box fast_coarse_box(const shell_space *space, const fast_data *data, uint32
     bool some = shell_box(space, triangle, lo, hi);
     for (int k = 0; k < 3; k++) {
         double a = (lo[k] - data->centre[k]) * data->scale, b = (hi[k] - data->centre[k]) * data->scale;
-        box.lower[k] = some ? fast_round_down(a - 0.5 * BOUNDS_PAD) : INFINITY;
-        box.upper[k] = some ? fast_round_up(b + 0.5 * BOUNDS_PAD) : -INFINITY;
+        box.lower[k] = some ? float_down(a - 0.5 * BOUNDS_PAD) : INFINITY;
+        box.upper[k] = some ? float_up(b + 0.5 * BOUNDS_PAD) : -INFINITY;
     }
     return box;
 }

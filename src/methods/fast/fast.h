@@ -141,8 +141,6 @@ enum { FAST_PACKET = 8 };
 void fast_walk_many_plain(fast_ray *rays, int count);
 void fast_walk_many_avx2(fast_ray *rays, int count);
 void fast_walk_many_avx512(fast_ray *rays, int count);
-float fast_round_down(double x);
-float fast_round_up(double x);
 
 /* Heights of codes, and the bounds that rays are clipped to, from those of the shells. */
 void fast_set_heights(const shell_space *space, fast_data *data);
@@ -153,7 +151,7 @@ knurl_status fast_update(const shell_space *space, const method_edit *edit, void
                          knurl_error *error);
 
 /* Building: each in its own file. */
-void fast_patch_make(const fast_data *data, const triangle_frame *frame, fast_patch *patch);
+void fast_patch_make(const triangle_frame *frame, fast_patch *patch);
 /* Sets the frame of a part that has its place, its range of s and where the triangle is on it; FAST_SEARCHED
  * where there is none. */
 void fast_part_frame(const fast_data *data, const triangle_frame *frame, fast_part *part);

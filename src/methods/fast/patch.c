@@ -29,7 +29,7 @@ static void set_edges(const triangle_frame *f, fast_patch *patch)
     }
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) patch->edge[k][i] = (float)planes[i][k];
-        patch->edge_error[i] = fast_round_up(
+        patch->edge_error[i] = float_up(
             ROUNDING * (fabs(planes[i][0]) + fabs(planes[i][1]) * reach[0] + fabs(planes[i][2]) * reach[1]));
     }
     patch->edge[0][3] = 1.0f;
@@ -67,13 +67,12 @@ static void set_normals(const triangle_frame *f, fast_patch *patch)
         set_vector(patch->normal[i], n[i]);
         most = max_d(most, v3_length(f->n[i]));
     }
-    patch->normal_most = fast_round_up(most * 1.001);
-    patch->normal_move = fast_round_up(1.001 * max_d(v3_length(n[1]), v3_length(n[2])));
+    patch->normal_most = float_up(most * 1.001);
+    patch->normal_move = float_up(1.001 * max_d(v3_length(n[1]), v3_length(n[2])));
 }
 
-void fast_patch_make(const fast_data *data, const triangle_frame *f, fast_patch *patch)
+void fast_patch_make(const triangle_frame *f, fast_patch *patch)
 {
-    (void)data;
     *patch = (fast_patch){0};
     if (f->flags & (SHELL_EMPTY | SHELL_FOLDED | SHELL_FLAT_UV)) {
         patch->flags = FAST_SEARCHED;
@@ -155,10 +154,10 @@ static bool set_errors(const axes *a, const double inverse[3][3], const converge
     double s = rounding[2] + c->factor * left, amplified = 1.0 / (1.0 - c->across);
     double most = max_d(rounding[0], rounding[1]);
     part->error[0] =
-        fast_round_up((c->across > 0.0 ? most * amplified : rounding[0]) + (rounding[2] + left) * c->lever);
+        float_up((c->across > 0.0 ? most * amplified : rounding[0]) + (rounding[2] + left) * c->lever);
     part->error[1] =
-        fast_round_up((c->across > 0.0 ? most * amplified : rounding[1]) + (rounding[2] + left) * c->lever);
-    part->error[2] = fast_round_up(s);
+        float_up((c->across > 0.0 ? most * amplified : rounding[1]) + (rounding[2] + left) * c->lever);
+    part->error[2] = float_up(s);
     return isfinite(part->error[2]) && part->error[0] < 1.0f && part->error[1] < 1.0f;
 }
 
@@ -177,7 +176,7 @@ static void set_origin(const axes *a, const double inverse[3][3], double x, doub
     }
     part->centre[0] = (float)(x + dx);
     part->centre[1] = (float)(y + dy);
-    part->error[2] = fast_round_up((double)part->error[2] + fabs(ds));
+    part->error[2] = float_up((double)part->error[2] + fabs(ds));
 }
 
 static bool set_frame(const fast_data *data, const triangle_frame *f, fast_part *part)
@@ -227,7 +226,7 @@ static void build_patches(void *user, size_t begin, size_t end, int32_t thread)
     for (size_t t = begin; t < end; t++) {
         triangle_frame f;
         triangle_frame_load(job->space, (uint32_t)t, &lod, &f);
-        fast_patch_make(job->data, &f, &job->data->patches[t]);
+        fast_patch_make(&f, &job->data->patches[t]);
     }
 }
 

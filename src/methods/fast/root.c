@@ -9,18 +9,6 @@
 #include "methods/fast/fast.h"
 #include "shell/search.h"
 
-float fast_round_down(double x)
-{
-    float f = to_float(x);
-    return (double)f > x ? nextafterf(f, -INFINITY) : f;
-}
-
-float fast_round_up(double x)
-{
-    float f = to_float(x);
-    return (double)f < x ? nextafterf(f, INFINITY) : f;
-}
-
 static const triangle_frame *load_frame(fast_ray *r, uint32_t triangle)
 {
     return frame_recall(r->memo, r->space, r->lod, triangle);

@@ -121,7 +121,7 @@ static knurl_status update_parts(updater *u, uint32_t triangle, knurl_error *err
 static bool update_patch(const updater *u, uint32_t triangle)
 {
     fast_patch *patch = &u->data->patches[triangle], made;
-    fast_patch_make(u->data, &u->frame, &made);
+    fast_patch_make(&u->frame, &made);
     if (patch->flags & FAST_CROWDED) made.flags |= FAST_SEARCHED | FAST_CROWDED;
     bool same = made.flags == patch->flags;
     if (same) *patch = made;

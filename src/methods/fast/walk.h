@@ -68,13 +68,9 @@ static bool visit_node(kernel *k, const part_curve *c, int level, int32_t x, int
     k->ray->steps++;
     uint32_t met = test_children(k, c, part_node(k, c->part, level, x, y), x, y, side, u0, u1, in, out);
     while (met) {
-        int n = __builtin_ctz(met);
-        for (uint32_t rest = met & (met - 1); rest; rest &= rest - 1)
-            if (in[__builtin_ctz(rest)] < in[n]) n = __builtin_ctz(rest);
+        int n = first_lane(met, in);
         met &= ~(1u << n);
-        if (k->ray->found &&
-            k->shift + (double)c->start + (double)c->length * (double)in[n] > k->ray->tau_max)
-            return false;
+        if (k->ray->found && curve_tau(k, c, in[n]) > k->ray->tau_max) return false;
         int32_t cx = x + side * (n & 3), cy = y + side * (n >> 2);
         if (level == 0 ? visit_block(k, c, cx, cy, in[n], out[n])
                        : visit_node(k, c, level - 1, cx, cy, in[n], out[n]))

@@ -29,7 +29,16 @@ typedef struct part_curve {
     float u0, u1;        /* where it is over the part, inside the triangle */
 } part_curve;
 
-/* Floats at or below and at or above x, without the care for the last bit that fast_round_up() takes. */
+/* Of the lanes in `set`, not empty, the one with the least number. */
+LANES_INLINE int first_lane(uint32_t set, const float *numbers)
+{
+    int first = __builtin_ctz(set);
+    for (uint32_t rest = set & (set - 1); rest; rest &= rest - 1)
+        if (numbers[__builtin_ctz(rest)] < numbers[first]) first = __builtin_ctz(rest);
+    return first;
+}
+
+/* Floats at or below and at or above x, without the care for the last bit that float_up() takes. */
 LANES_INLINE float float_below(double x)
 {
     return (float)(x - 2.5e-7 * fabs(x));
@@ -149,6 +158,11 @@ static bool clip_to_part(part_curve *c, vf4 first, vf4 last)
 LANES_INLINE vf4 curve_value(const part_curve *c, float u)
 {
     return mad4(mad4(c->c2, set4(u), c->c1), set4(u), c->c0);
+}
+
+LANES_INLINE double curve_tau(const kernel *k, const part_curve *c, float u)
+{
+    return k->shift + (double)c->start + (double)c->length * (double)u;
 }
 
 #endif

@@ -169,9 +169,9 @@ static uint32_t negative_sides(const part_curve *c, float x, float y, float off_
     return mask4(b < set4(0.0f)) & 7u;
 }
 
-LANES_INLINE double curve_tau(const kernel *k, const part_curve *c, const block *b, float v)
+LANES_INLINE double block_tau(const kernel *k, const part_curve *c, const block *b, float v)
 {
-    return k->shift + (double)c->start + (double)c->length * (double)(b->u0 + v * b->length);
+    return curve_tau(k, c, b->u0 + v * b->length);
 }
 
 LANES_INLINE vf4 block_value(const block *b, float v)
@@ -213,8 +213,8 @@ static bool look_at_texel(kernel *k, const part_curve *c, const block *b, const 
     int count = texel_roots(t->g0[lane], t->gm[lane], t->g1[lane], t->margin[lane], w, reach);
     if (count < 0) {
         if (passes_outside(c, b, v0, t->v1[lane])) return false;
-        found.tau_in = curve_tau(k, c, b, v0) - slack;
-        found.tau_out = curve_tau(k, c, b, t->v1[lane]) + slack;
+        found.tau_in = block_tau(k, c, b, v0) - slack;
+        found.tau_out = block_tau(k, c, b, t->v1[lane]) + slack;
         return fast_decide(r, &found) && r->any;
     }
     found.certain = true;
@@ -222,7 +222,7 @@ static bool look_at_texel(kernel *k, const part_curve *c, const block *b, const 
         /* The root is somewhere between these. */
         float v = v0 + w[i] * length, first = v - reach[i] * length, last = v + reach[i] * length;
         if (passes_outside(c, b, first, last)) continue;
-        found.tau = curve_tau(k, c, b, v);
+        found.tau = block_tau(k, c, b, v);
         double off = slack + (double)(reach[i] * length * b->length) * (double)c->length;
         if (found.tau + off < r->tau_min || found.tau - off > r->tau_max) continue;
         if (r->any && found.tau - off > r->tau_min && found.tau + off < r->tau_max &&
@@ -256,15 +256,10 @@ static bool visit_block(kernel *k, const part_curve *c, int32_t x, int32_t y, fl
     uint32_t may = test_texels(k, c, &b, rows, 0, &t);
     may |= test_texels(k, c, &b, rows, 2, &t);
     while (may) {
-        int lane = __builtin_ctz(may);
-        for (uint32_t rest = may & (may - 1); rest; rest &= rest - 1)
-            if (t.v0[__builtin_ctz(rest)] < t.v0[lane]) lane = __builtin_ctz(rest);
+        int lane = first_lane(may, t.v0);
         may &= ~(1u << lane);
         if (look_at_texel(k, c, &b, &t, lane)) return true;
-        if (k->ray->found &&
-            (double)c->start + (double)c->length * (double)(b.u0 + t.v0[lane] * b.length) + k->shift >
-                k->ray->tau_max)
-            return false;
+        if (k->ray->found && block_tau(k, c, &b, t.v0[lane]) > k->ray->tau_max) return false;
     }
     return false;
 }
